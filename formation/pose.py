@@ -1,0 +1,46 @@
+"""Poses and motions of a unicycle, and its exact step along an arc."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from formation.angles import wrap
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Position (x, y) [m] and heading theta [rad] in the world frame, heading counter-clockwise from x."""
+
+    x: float
+    y: float
+    theta: float
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Speed v [m/s] along the heading and turn rate u [rad/s], counter-clockwise positive."""
+
+    v: float
+    u: float
+
+
+STANDSTILL = Motion(0.0, 0.0)
+
+
+def advance(pose: Pose, v: float, u: float, dt: float) -> Pose:
+    """Pose after driving for ``dt`` seconds at constant speed v and turn rate u; heading wrapped.
+
+    This is the exact solution of the unicycle (Eq. (1) of the paper), not a step of an integrator. It is
+    written with the chord of the arc, v*dt * sin(h)/h with half the turned angle h = u*dt/2, whose direction
+    is theta + h: the textbook form with the radius v/u subtracts nearly equal sines when u*dt is small, while
+    this one keeps full precision for every u, zero included. ``dt`` may be negative.
+    """
+    half_turn = 0.5 * u * dt
+    chord = v * dt * (math.sin(half_turn) / half_turn if half_turn else 1.0)
+    direction = pose.theta + half_turn
+    return Pose(
+        pose.x + chord * math.cos(direction),
+        pose.y + chord * math.sin(direction),
+        wrap(pose.theta + u * dt),
+    )
