@@ -1,0 +1,54 @@
+"""The spacing functions g and f that hold the distance, and the Lyapunov function built on g."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TypeVar
+
+from formation.angles import FloatArray
+from formation.shape import Shape
+
+Number = TypeVar("Number", float, FloatArray)
+
+
+@dataclass(frozen=True, slots=True)
+class Spacing:
+    """Spacing functions of Sec. IV-A of the paper for a desired distance rho_0 [m] and a gain mu_rho [1/m].
+
+    f(rho) = mu_rho (rho^2 - rho_0^2) / rho^2 is the derivative of g, and g(rho_0) = 0. Both take rho > 0 as a
+    float or an array. f grows with rho and stays below mu_rho, so that it can hold against a constant turn of
+    the leader only up to mu_rho * v1. Raises :class:`ValueError` unless both constants are positive and
+    finite.
+    """
+
+    rho_0: float
+    mu_rho: float
+
+    def __post_init__(self) -> None:
+        for name, value in (("rho_0", self.rho_0), ("mu_rho", self.mu_rho)):
+            if not (value > 0.0 and math.isfinite(value)):
+                raise ValueError(f"{name} is {value}, expected a positive finite number")
+
+    def f(self, rho: Number) -> Number:
+        """Restoring term f [1/m]: negative when too close, positive when too far."""
+        # Factored, so that the zero at rho_0 is exact and its surroundings lose no digits.
+        return self.mu_rho * ((rho - self.rho_0) / rho) * ((rho + self.rho_0) / rho)
+
+    def g(self, rho: Number) -> Number:
+        """Potential g >= 0, without unit: g' = f, zero at rho_0 only, infinite at 0 and at infinity."""
+        offset = rho - self.rho_0
+        return self.mu_rho * offset * (offset / rho)
+
+    def f_prime(self, rho: Number) -> Number:
+        """Slope of f [1/m^2]; positive everywhere."""
+        ratio = self.rho_0 / rho
+        return 2.0 * self.mu_rho * ratio * ratio / rho
+
+
+def lyapunov(shape: Shape, spacing: Spacing) -> float:
+    """V1 = 1 + sin(alpha1) + g(rho) of the proof of Prop. 1: zero only abreast at rho_0 on the right.
+
+    V1 < 2 is the region of attraction that the proof covers; the true one is larger.
+    """
+    return 1.0 + math.sin(shape.alpha1) + spacing.g(shape.rho)
