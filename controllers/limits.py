@@ -1,0 +1,47 @@
+"""Speed and turn-rate limits of a robot."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from formation.pose import Motion
+
+
+def clip(value: float, bound: float) -> float:
+    """Nearest value to ``value`` in [-bound, bound]. NaN stays NaN: it must not turn into a limit."""
+    if value > bound:
+        return bound
+    if value < -bound:
+        return -bound
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Symmetric limits |v| <= v_max [m/s] and |u| <= u_max [rad/s].
+
+    Raises :class:`ValueError` unless both are positive and finite.
+    """
+
+    v_max: float
+    u_max: float
+
+    def __post_init__(self) -> None:
+        for name, value in (("v_max", self.v_max), ("u_max", self.u_max)):
+            if not (value > 0.0 and math.isfinite(value)):
+                raise ValueError(f"{name} is {value}, expected a positive finite number")
+
+    def apply(self, wanted: Motion) -> tuple[Motion, bool]:
+        """Clip speed and turn rate, each on its own; the flag says whether one was beyond its limit.
+
+        An infinite value is clipped like any that is too large; NaN is passed on as NaN, for
+        :func:`controllers.guard.decide` to refuse.
+        """
+        allowed = Motion(clip(wanted.v, self.v_max), clip(wanted.u, self.u_max))
+        saturated = abs(wanted.v) > self.v_max or abs(wanted.u) > self.u_max
+        return allowed, saturated
+
+    def allow(self, motion: Motion) -> bool:
+        """Whether both are finite and within their limits."""
+        return abs(motion.v) <= self.v_max and abs(motion.u) <= self.u_max
