@@ -2,7 +2,7 @@
 
 State ``[px, py, wx, wy, u1]``: leader position [m], leader velocity [m/s] and leader turn rate [rad/s].
 In the fixed frame p and w are mocap coordinates. In the body frame p is the leader's position seen from the
-follower, and w the leader's *absolute* velocity, both along the axes of the follower (x ahead, y to its left).
+follower, and w the leader's *absolute* velocity, both along the follower's axes (x ahead, y to its left).
 """
 
 from __future__ import annotations

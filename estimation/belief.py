@@ -1,0 +1,106 @@
+"""A Gaussian belief about the leader and the model that moves it, in the frame of the front end."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation import motion
+from estimation.measurement import FrontEnd, Measurement
+from estimation.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise, Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """Memory of an estimator that differences: the last range and bearing, and their smoothed rates."""
+
+    rho: float
+    alpha2: float
+    rho_dot: float
+    alpha2_dot: float
+    heading: float
+    samples: int
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """Mean (5,) and covariance (5, 5) of the state of :mod:`estimation.motion`.
+
+    ``rates`` and ``elapsed`` (time since the last update [s]) are kept by estimators that difference.
+    """
+
+    mean: Vector
+    covariance: Matrix
+    rates: Rates | None = None
+    elapsed: float = 0.0
+
+    @property
+    def speed(self) -> float:
+        """Leader speed v1 [m/s]."""
+        return math.hypot(float(self.mean[2]), float(self.mean[3]))
+
+    @property
+    def sd_heading(self) -> float:
+        """Standard deviation [rad] of the leader's direction of motion; infinite while its speed is zero."""
+        speed = self.speed
+        if speed == 0.0:
+            return math.inf
+        across = np.array([-self.mean[3], self.mean[2]]) / speed
+        return math.sqrt(max(0.0, float(across @ self.covariance[2:4, 2:4] @ across))) / speed
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """How a belief moves between measurements: front end, leader limits, process and input noise."""
+
+    front_end: FrontEnd
+    limits: LeaderLimits
+    noise: ProcessNoise
+    input_correlation: float = 0.05
+
+    def start(self, measurement: Measurement) -> Belief:
+        """Belief of one who knows the position only: w = 0 with sd k_v per axis, u1 = 0 with sd k_u."""
+        mean = np.zeros(motion.STATE_SIZE)
+        mean[0:2] = measurement.position
+        covariance = np.diag([0.0, 0.0, self.limits.k_v**2, self.limits.k_v**2, self.limits.k_u**2])
+        covariance[0:2, 0:2] = measurement.covariance
+        return Belief(mean, covariance)
+
+    def propagate(self, mean: Vector, dt: float, follower: FollowerMotion) -> Vector:
+        """State after dt [s]."""
+        if self.front_end is FrontEnd.WORLD:
+            return motion.propagate(mean, dt)
+        return motion.propagate_body(mean, dt, follower)
+
+    def transition(self, mean: Vector, dt: float, follower: FollowerMotion) -> Matrix:
+        """Jacobian (5, 5) of :meth:`propagate`."""
+        if self.front_end is FrontEnd.WORLD:
+            return motion.transition(mean, dt)
+        return motion.transition_body(mean, dt, follower)
+
+    def process_noise(self, mean: Vector, dt: float, follower: FollowerMotion) -> Matrix:
+        """Covariance (5, 5) that dt [s] adds."""
+        if self.front_end is FrontEnd.WORLD:
+            return motion.process_noise(mean, dt, self.noise)
+        return motion.process_noise_body(mean, dt, self.noise, follower, self.input_correlation)
+
+
+@dataclass(frozen=True, slots=True)
+class Innovation:
+    """What a measurement adds to a prediction: the residual (2,), its covariance (2, 2), and the NIS."""
+
+    residual: Vector
+    covariance: Matrix
+    nis: float
+
+
+def innovation(belief: Belief, measurement: Measurement) -> Innovation:
+    """Innovation of a position measurement; its NIS should be chi-square with 2 degrees of freedom."""
+    residual = measurement.position - belief.mean[0:2]
+    covariance = belief.covariance[0:2, 0:2] + measurement.covariance
+    (a, b), (_, d) = covariance.tolist()
+    x, y = residual.tolist()
+    nis = (d * x * x - 2.0 * b * x * y + a * y * y) / (a * d - b * b)
+    return Innovation(residual, covariance, nis)

@@ -1,0 +1,88 @@
+"""The paper's literal estimator: difference range and bearing, smooth, then Eq. (7). Kept to compare with."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from estimation.belief import Belief, Model, Rates
+from estimation.measurement import FrontEnd, Measurement
+from estimation.motion import FollowerMotion
+from formation.angles import wrap
+
+
+class DifferenceEstimator:
+    """Rates by differences through a first-order low-pass of time constant ``cutoff`` [s].
+
+    rho_dot and alpha2_dot give X and Y of the paper, these give w; u1 is the low-passed turn of w. The
+    covariance is that of white measurement noise through the same low-pass, plus its lag behind a leader
+    that turns at k_u.
+    """
+
+    def __init__(self, model: Model, cutoff: float) -> None:
+        self.model = model
+        self.cutoff = cutoff
+
+    def start(self, measurement: Measurement) -> Belief:
+        """Belief from the first measurement alone: no rates yet."""
+        base = self.model.start(measurement)
+        rho, alpha2 = _range_and_bearing(measurement)
+        return Belief(base.mean, base.covariance, Rates(rho, alpha2, 0.0, 0.0, 0.0, 0))
+
+    def predict(self, belief: Belief, dt: float, follower: FollowerMotion) -> Belief:
+        """Belief after dt [s]: the position moves with the velocity estimated last; the rates stay."""
+        mean = self.model.propagate(belief.mean, dt, follower)
+        transition = self.model.transition(belief.mean, dt, follower)
+        noise = self.model.process_noise(belief.mean, dt, follower)
+        covariance = transition @ belief.covariance @ transition.T + noise
+        return Belief(mean, 0.5 * (covariance + covariance.T), belief.rates, belief.elapsed + dt)
+
+    def update(self, belief: Belief, measurement: Measurement) -> Belief:
+        """Belief after a measurement: difference it against the last one and smooth."""
+        last, dt = belief.rates, belief.elapsed
+        if last is None or dt <= 0.0:
+            return belief
+        rho, alpha2 = _range_and_bearing(measurement)
+        gain = max(dt / (self.cutoff + dt), 1.0 / (last.samples + 1))
+        rho_dot = last.rho_dot + gain * ((rho - last.rho) / dt - last.rho_dot)
+        alpha2_dot = last.alpha2_dot + gain * (float(wrap(alpha2 - last.alpha2)) / dt - last.alpha2_dot)
+        v2, u2 = measurement.motion.v2, measurement.motion.u2
+        X = -rho_dot - v2 * math.cos(alpha2)
+        Y = rho * (alpha2_dot + u2) - v2 * math.sin(alpha2)
+        v1, alpha1 = math.hypot(X, Y), math.atan2(Y, X)
+        sight = alpha2 + (measurement.pose.theta if measurement.pose is not None else 0.0)
+        heading = sight + math.pi - alpha1
+        turn = float(wrap(heading - last.heading)) / dt
+        if self.model.front_end is FrontEnd.BODY:
+            turn += u2
+        u1 = float(belief.mean[4]) + gain * (turn - float(belief.mean[4])) if last.samples else 0.0
+        mean = np.array([*measurement.position, v1 * math.cos(heading), v1 * math.sin(heading), u1])
+        rates = Rates(rho, alpha2, rho_dot, alpha2_dot, heading, last.samples + 1)
+        return Belief(mean, self._covariance(measurement, gain, dt, v1), rates)
+
+    def _covariance(
+        self, measurement: Measurement, gain: float, dt: float, v1: float
+    ) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+        """Variance of a smoothed difference of white noise, sigma^2 (gain/dt)^2 2/(2 - gain), and the lag."""
+        smoothed = (gain / dt) ** 2 * 2.0 / (2.0 - gain)
+        limits = self.model.limits
+        lag = (self.cutoff * limits.k_u * max(v1, limits.v_eps)) ** 2
+        covariance = np.zeros((5, 5))
+        covariance[0:2, 0:2] = measurement.covariance
+        velocity = smoothed * measurement.covariance + lag * np.eye(2)
+        if measurement.pose_noise is not None:
+            velocity += smoothed * measurement.covariance
+        covariance[2:4, 2:4] = velocity
+        across = float(np.trace(velocity)) / 2.0 / max(v1, limits.v_eps) ** 2
+        covariance[4, 4] = min(across * smoothed, limits.k_u**2)
+        return covariance
+
+
+def _range_and_bearing(measurement: Measurement) -> tuple[float, float]:
+    """Range [m] and bearing [rad] of the leader seen from the follower."""
+    x, y = measurement.position.tolist()
+    if measurement.pose is None:
+        return math.hypot(x, y), math.atan2(y, x)
+    dx, dy = x - measurement.pose.x, y - measurement.pose.y
+    return math.hypot(dx, dy), float(wrap(math.atan2(dy, dx) - measurement.pose.theta))

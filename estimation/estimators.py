@@ -1,0 +1,24 @@
+"""The registry of estimators: one name, one way to build each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from estimation.belief import Model
+from estimation.difference import DifferenceEstimator
+from estimation.kalman import ExtendedFilter, UnscentedFilter
+from estimation.tracking import Estimator
+
+ESTIMATORS: dict[str, Callable[[Model, float], Estimator]] = {
+    "ekf": lambda model, cutoff: ExtendedFilter(model),
+    "ukf": lambda model, cutoff: UnscentedFilter(model),
+    "difference": DifferenceEstimator,
+}
+
+
+def make_estimator(name: str, model: Model, cutoff: float = 0.1) -> Estimator:
+    """Build the estimator of a name in :data:`ESTIMATORS`; ``cutoff`` [s] is the low-pass of ``difference``.
+
+    Raises KeyError for an unknown name.
+    """
+    return ESTIMATORS[name](model, cutoff)

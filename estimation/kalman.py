@@ -1,0 +1,98 @@
+"""EKF and UKF on the coordinated-turn model, carried by filterpy."""
+
+from __future__ import annotations
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
+
+from estimation.belief import Belief, Model
+from estimation.measurement import Measurement
+from estimation.motion import STATE_SIZE, FollowerMotion, Matrix, Vector
+
+_POSITION = np.eye(2, STATE_SIZE)
+
+
+class _Carrier(ExtendedKalmanFilter):  # type: ignore[misc]
+    """filterpy's EKF with the exact nonlinear motion of the mean in place of F x."""
+
+    moved: Vector
+
+    def predict_x(self, u: float = 0.0) -> None:
+        self.x = self.moved
+
+
+class ExtendedFilter:
+    """First-order filter: the covariance moves by the Jacobian of the motion at the mean."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self._carrier = _Carrier(dim_x=STATE_SIZE, dim_z=2)
+
+    def start(self, measurement: Measurement) -> Belief:
+        """Belief from the first measurement alone."""
+        return self.model.start(measurement)
+
+    def predict(self, belief: Belief, dt: float, follower: FollowerMotion) -> Belief:
+        """Belief after dt [s], the follower having moved as given."""
+        carrier = self._carrier
+        carrier.x, carrier.P = belief.mean, belief.covariance
+        carrier.moved = self.model.propagate(belief.mean, dt, follower)
+        carrier.F = self.model.transition(belief.mean, dt, follower)
+        carrier.Q = self.model.process_noise(belief.mean, dt, follower)
+        carrier.predict()
+        return Belief(carrier.x, _symmetric(carrier.P))
+
+    def update(self, belief: Belief, measurement: Measurement) -> Belief:
+        """Belief after a measurement of the leader's position (Joseph form)."""
+        carrier = self._carrier
+        carrier.x, carrier.P = belief.mean, belief.covariance
+        carrier.update(measurement.position, _position_jacobian, _position_of, R=measurement.covariance)
+        return Belief(carrier.x, _symmetric(carrier.P))
+
+
+class UnscentedFilter:
+    """Sigma-point filter: eleven points carry mean and covariance through the exact motion.
+
+    The points are spread by alpha = 0.5, beta = 2, kappa = 0, so that the centre weight stays moderate and
+    the covariance positive definite.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        points = MerweScaledSigmaPoints(STATE_SIZE, alpha=0.5, beta=2.0, kappa=0.0)
+        self._carrier = UnscentedKalmanFilter(
+            dim_x=STATE_SIZE, dim_z=2, dt=0.0, hx=_position_of, fx=model.propagate, points=points
+        )
+
+    def start(self, measurement: Measurement) -> Belief:
+        """Belief from the first measurement alone."""
+        return self.model.start(measurement)
+
+    def predict(self, belief: Belief, dt: float, follower: FollowerMotion) -> Belief:
+        """Belief after dt [s], the follower having moved as given."""
+        carrier = self._carrier
+        carrier.x, carrier.P = belief.mean, belief.covariance
+        carrier.Q = self.model.process_noise(belief.mean, dt, follower)
+        carrier.predict(dt=dt, follower=follower)
+        return Belief(carrier.x, _symmetric(carrier.P))
+
+    def update(self, belief: Belief, measurement: Measurement) -> Belief:
+        """Belief after a measurement of the leader's position."""
+        carrier = self._carrier
+        carrier.x, carrier.P = belief.mean, belief.covariance
+        carrier.sigmas_f = carrier.points_fn.sigma_points(belief.mean, belief.covariance)
+        carrier.update(measurement.position, R=measurement.covariance)
+        return Belief(carrier.x, _symmetric(carrier.P))
+
+
+def _position_jacobian(_mean: Vector) -> Matrix:
+    return _POSITION
+
+
+def _position_of(mean: Vector) -> Vector:
+    return mean[0:2]
+
+
+def _symmetric(covariance: Matrix) -> Matrix:
+    symmetric: Matrix = 0.5 * (covariance + covariance.T)
+    return symmetric
