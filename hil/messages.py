@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TypeVar, cast
 
 from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from hil.errors import AbreastError, UsageError
@@ -28,22 +28,13 @@ class MalformedPayloadError(AbreastError):
     """A payload that is not a valid message of the type it was taken for."""
 
 
-def use_own_types(typestore: Typestore) -> None:
-    """Make the typestore build our own classes for those of our types that it knows under the same layout."""
-    ours = _typestore().fielddefs
-    for kind in OWN_TYPES:
-        name = kind.__msgtype__
-        if name in typestore.fielddefs and typestore.fielddefs[name][1] == ours[name][1]:
-            typestore.types[name] = kind
-
-
 def encode(message: Message) -> bytes:
     """Return the message as little-endian CDR."""
     return bytes(_typestore().serialize_cdr(message, message.__msgtype__, little_endian=True))
 
 
 def decode(payload: bytes | memoryview, typename: str, typestore: Typestore | None = None) -> Message:
-    """Return the message of the given type; ``typestore`` replaces the built-in types by those of a log.
+    """Return the message of the given type, by the built-in types or by those of :func:`typestore_of`.
 
     Raises :class:`MalformedPayloadError` for a payload that is not exactly one such message (padding to the
     next multiple of four may follow), and :class:`UsageError` for a type that isn't known. Values are not
@@ -69,6 +60,23 @@ def decode_as(payload: bytes | memoryview, kind: type[M]) -> M:
 def typename_of(message: Message | type[Message]) -> str:
     """Return the full type name, such as ``abreast_msgs/msg/Command``."""
     return message.__msgtype__
+
+
+@functools.lru_cache
+def typestore_of(typename: str, text: str) -> Typestore:
+    """Return the types to decode a foreign type with, given its complete ``ros2msg`` text.
+
+    These are the built-in ones if the layout is the same, so that a message has the classes of
+    :mod:`hil.message_types` whoever wrote it. Raises :class:`UsageError` if the text can't be used.
+    """
+    store = get_typestore(Stores.EMPTY)
+    try:
+        store.register(get_types_from_msg(text, typename))
+        digest = store.hash_rihs01(typename)
+    except (TypesysError, KeyError) as error:
+        reason = str(error).splitlines()[0]
+        raise UsageError(f"message type {typename!r}: its definition can't be used ({reason})") from None
+    return _typestore() if typename in _typestore().fielddefs and rihs01(typename) == digest else store
 
 
 @functools.cache

@@ -1,0 +1,193 @@
+"""Writing MCAP with chunks that end where the caller says.
+
+The ``mcap`` package's own writer ends a chunk by size alone, so whatever is still in memory is lost with the
+process. Here the record layouts are that package's; only what goes into which chunk is decided here.
+Reference: the MCAP format specification, version 0.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Callable, Iterable, Mapping
+
+import zstandard
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    MessageIndex,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+
+MAGIC = b"\x89MCAP0\r\n"
+
+_MESSAGE_HEAD = struct.Struct("<BQHIQQ")
+_MESSAGE_FIXED_BYTES = 22
+_FOOTER_HEAD = struct.Struct("<BQQQ")
+_FOOTER_BYTES = 20
+
+
+class ChunkedMcap:
+    """An MCAP file in the making: ``emit`` gets whole records, which one after the other are the file."""
+
+    def __init__(self, emit: Callable[[bytes], None], profile: str, library: str) -> None:
+        self._emit_bytes = emit
+        self._offset = 0
+        self._schemas: list[Schema] = []
+        self._channels: list[Channel] = []
+        self._metadata_indexes: list[MetadataIndex] = []
+        self._chunk_indexes: list[ChunkIndex] = []
+        self._message_counts: dict[int, int] = {}
+        self._span: tuple[int, int] | None = None
+        self._chunk = bytearray()
+        self._chunk_entries: dict[int, list[tuple[int, int]]] = {}
+        self._compressor = zstandard.ZstdCompressor()
+        self._emit(MAGIC + _bytes_of([Header(profile=profile, library=library)]))
+
+    @property
+    def open_chunk_bytes(self) -> int:
+        """Size of the chunk that is still in memory, before compression."""
+        return len(self._chunk)
+
+    def add_metadata(self, name: str, entries: Mapping[str, str]) -> None:
+        """Write a metadata record at once."""
+        record = _bytes_of([Metadata(name=name, metadata=dict(entries))])
+        self._metadata_indexes.append(MetadataIndex(offset=self._offset, length=len(record), name=name))
+        self._emit(record)
+
+    def add_schema(self, name: str, encoding: str, data: bytes) -> int:
+        """Declare a message type; returns its id."""
+        schema = Schema(id=len(self._schemas) + 1, name=name, encoding=encoding, data=data)
+        self._schemas.append(schema)
+        self._chunk += _bytes_of([schema])
+        return schema.id
+
+    def add_channel(self, topic: str, schema_id: int, encoding: str, metadata: Mapping[str, str]) -> int:
+        """Declare a topic of a message type; returns its id."""
+        channel = Channel(
+            id=len(self._channels) + 1,
+            topic=topic,
+            schema_id=schema_id,
+            message_encoding=encoding,
+            metadata=dict(metadata),
+        )
+        self._channels.append(channel)
+        self._message_counts[channel.id] = 0
+        self._chunk += _bytes_of([channel])
+        return channel.id
+
+    def add_message(self, channel_id: int, log_ns: int, publish_ns: int, payload: bytes) -> None:
+        """Put a message into the open chunk, with the channel's next sequence number (from 0)."""
+        sequence = self._message_counts[channel_id]
+        head = _MESSAGE_HEAD.pack(
+            Opcode.MESSAGE,
+            _MESSAGE_FIXED_BYTES + len(payload),
+            channel_id,
+            sequence & 0xFFFFFFFF,
+            log_ns,
+            publish_ns,
+        )
+        self._chunk_entries.setdefault(channel_id, []).append((log_ns, len(self._chunk)))
+        self._chunk += head
+        self._chunk += payload
+        self._message_counts[channel_id] = sequence + 1
+
+    def close_chunk(self) -> None:
+        """End the open chunk and write it with its index; does nothing if it holds no message."""
+        if not self._chunk_entries:
+            return
+        data, entries = bytes(self._chunk), self._chunk_entries
+        self._chunk, self._chunk_entries = bytearray(), {}
+        times = [log_ns for channel_entries in entries.values() for log_ns, _ in channel_entries]
+        first, last = min(times), max(times)
+        self._span = (min(first, self._span[0]), max(last, self._span[1])) if self._span else (first, last)
+        chunk = Chunk(
+            compression="zstd",
+            data=self._compressor.compress(data),
+            message_start_time=first,
+            message_end_time=last,
+            uncompressed_crc=zlib.crc32(data),
+            uncompressed_size=len(data),
+        )
+        written = _bytes_of([chunk])
+        chunk_bytes = len(written)
+        index_offsets: dict[int, int] = {}
+        for channel_id, channel_entries in entries.items():
+            index_offsets[channel_id] = self._offset + len(written)
+            written += _bytes_of([MessageIndex(channel_id=channel_id, records=channel_entries)])
+        index = ChunkIndex(
+            chunk_start_offset=self._offset,
+            chunk_length=chunk_bytes,
+            compression=chunk.compression,
+            compressed_size=len(chunk.data),
+            uncompressed_size=chunk.uncompressed_size,
+            message_start_time=first,
+            message_end_time=last,
+            message_index_offsets=index_offsets,
+            message_index_length=len(written) - chunk_bytes,
+        )
+        self._chunk_indexes.append(index)
+        self._emit(written)
+
+    def finish(self) -> None:
+        """Write what is still in memory, the summary and the end of the file."""
+        self.close_chunk()
+        self._emit(_bytes_of([DataEnd(data_section_crc=0)]))
+        summary_start = self._offset
+        groups: list[tuple[Opcode, bytes]] = [
+            (Opcode.SCHEMA, _bytes_of(self._schemas)),
+            (Opcode.CHANNEL, _bytes_of(self._channels)),
+            (Opcode.STATISTICS, _bytes_of([self._statistics()])),
+            (Opcode.CHUNK_INDEX, _bytes_of(self._chunk_indexes)),
+            (Opcode.METADATA_INDEX, _bytes_of(self._metadata_indexes)),
+        ]
+        offsets: list[SummaryOffset] = []
+        summary = b""
+        for opcode, data in groups:
+            if data:
+                start = summary_start + len(summary)
+                offsets.append(SummaryOffset(group_opcode=opcode, group_start=start, group_length=len(data)))
+                summary += data
+        offsets_start = summary_start + len(summary)
+        summary += _bytes_of(offsets)
+        footer_head = _FOOTER_HEAD.pack(Opcode.FOOTER, _FOOTER_BYTES, summary_start, offsets_start)
+        crc = zlib.crc32(footer_head, zlib.crc32(summary))
+        footer = Footer(summary_start=summary_start, summary_offset_start=offsets_start, summary_crc=crc)
+        self._emit(summary + _bytes_of([footer]) + MAGIC)
+
+    def _statistics(self) -> Statistics:
+        first, last = self._span or (0, 0)
+        return Statistics(
+            attachment_count=0,
+            channel_count=len(self._channels),
+            channel_message_counts={number: count for number, count in self._message_counts.items() if count},
+            chunk_count=len(self._chunk_indexes),
+            message_count=sum(self._message_counts.values()),
+            message_start_time=first,
+            message_end_time=last,
+            metadata_count=len(self._metadata_indexes),
+            schema_count=len(self._schemas),
+        )
+
+    def _emit(self, data: bytes) -> None:
+        self._emit_bytes(data)
+        self._offset += len(data)
+
+
+def _bytes_of(records: Iterable[McapRecord]) -> bytes:
+    builder = RecordBuilder()
+    for record in records:
+        record.write(builder)
+    data: bytes = builder.end()  # type: ignore[no-untyped-call]  # the package leaves it unannotated
+    return data
