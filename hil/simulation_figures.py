@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 from matplotlib.projections.polar import PolarAxes
+from matplotlib.ticker import MaxNLocator
 
 from formation.angles import FloatArray
 from formation.closed_loop import Trajectory
@@ -19,7 +20,7 @@ from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2
 from hil.scenario import Scenario
 
 LEADER, FOLLOWER = "#1f5fa8", "#d9741a"
-ORBIT, NOW, QUIET = "#3c3c3c", "#2a8f4c", "#8a8a8a"
+ORBIT, NOW, QUIET, LIMIT = "#3c3c3c", "#2a8f4c", "#8a8a8a", "#b03030"
 MOMENTS = 7
 DPI = 130
 _PI_TICKS = {
@@ -36,10 +37,12 @@ def draw_simulation(
     scenario: Scenario, trajectory: Trajectory, orbit: PeriodicOrbit | None, path: Path
 ) -> None:
     """Write a PNG like Fig. 2: (i) tracks, (ii) polar plot of the shape, (iii) bearings and controls."""
-    figure = _figure(scenario, trajectory, 13.5, 4.8)
-    grid = figure.add_gridspec(3, 3, width_ratios=(1.05, 1.0, 1.15))
+    figure = _figure(scenario, trajectory, 14.0, 5.0)
+    grid = figure.add_gridspec(3, 3, width_ratios=(1.05, 0.95, 1.2))
     draw_tracks(figure.add_subplot(grid[:, 0]), trajectory, scenario.formation.rho_0)
-    polar = figure.add_subplot(grid[:, 1], projection="polar")
+    # The layout engine does not reserve room for what sticks out of a polar plot: give it empty rows.
+    middle = grid[:, 1].subgridspec(3, 1, height_ratios=(0.05, 1.0, 0.13))
+    polar = figure.add_subplot(middle[1], projection="polar")
     assert isinstance(polar, PolarAxes)
     draw_polar(polar, trajectory, orbit, scenario.formation.rho_0)
     rows = [figure.add_subplot(grid[row, 2]) for row in range(3)]
@@ -101,12 +104,13 @@ def draw_polar(axes: PolarAxes, trajectory: Trajectory, orbit: PeriodicOrbit | N
     final = f"t = {trajectory.t[-1]:g} s"
     axes.plot(trajectory.alpha1[-1], radius[-1], "o", ms=5, color=NOW, zorder=7, label=final)
     axes.set_rmax(1.08 * float(radius.max()))
-    axes.set_rlabel_position(0.0)
+    axes.set_rlabel_position(180.0)
+    axes.yaxis.set_major_locator(MaxNLocator(4, prune="lower"))
     axes.set_xticks(np.arange(8) * math.pi / 4)
     axes.set_xticklabels(_POLAR_TICKS)
     axes.tick_params(labelsize=8, colors="#444444")
     axes.grid(alpha=0.3)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=2, frameon=False, fontsize=9)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, frameon=False, fontsize=9)
 
 
 def draw_distance(axes: Axes, trajectory: Trajectory, rho_0: float) -> None:
@@ -131,7 +135,7 @@ def draw_bearings(axes: Axes, trajectory: Trajectory) -> None:
     axes.set_yticks([tick for tick in _PI_TICKS if low <= tick <= high])
     axes.set_yticklabels([text for tick, text in _PI_TICKS.items() if low <= tick <= high])
     axes.set_ylabel(r"$\alpha_i$ [rad]")
-    axes.legend(loc="center right", ncols=2, frameon=False, fontsize=9)
+    axes.legend(loc="center right", ncols=2, frameon=False, fontsize=9, borderaxespad=0.1)
 
 
 def draw_speed(axes: Axes, scenario: Scenario, trajectory: Trajectory) -> None:
@@ -151,10 +155,13 @@ def _draw_control(axes: Axes, t: FloatArray, driven: FloatArray, desired: FloatA
     axes.plot(t, desired, color=ORBIT, lw=1.0, ls="--", label="desired")
     axes.plot(t, driven, color=FOLLOWER, lw=1.4, label="follower")
     # A limit far outside what is driven would only flatten the curves.
-    for side in (-limit, limit):
-        if 1.5 * float(driven.min()) <= side <= 1.5 * float(driven.max()):
-            axes.axhline(side, color="#b03030", lw=0.9, ls=":", label="limit of the robot")
-    axes.legend(loc="upper right", ncols=3, frameon=False, fontsize=8)
+    near = [side for side in (limit, -limit) if 1.5 * driven.min() <= side <= 1.5 * driven.max()]
+    for index, side in enumerate(near):
+        label = "limit (not applied)" if index == 0 else None
+        axes.axhline(side, color=LIMIT, lw=1.0, ls=":", label=label)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.3 * (high - low))
+    axes.legend(loc="upper right", ncols=3, frameon=False, fontsize=8, borderaxespad=0.1)
 
 
 def _draw_robot(axes: Axes, pose: FloatArray, radius: float, colour: str, opacity: float) -> None:
@@ -182,8 +189,9 @@ def _share_time(rows: list[Axes], trajectory: Trajectory) -> None:
     for axes in rows:
         axes.set_xlim(float(trajectory.t[0]), float(trajectory.t[-1]))
         axes.grid(alpha=0.25)
-        axes.label_outer()
+        axes.tick_params(labelbottom=axes is rows[-1])
     rows[-1].set_xlabel("t [s]")
+    rows[0].figure.align_ylabels(rows)
 
 
 def _figure(scenario: Scenario, trajectory: Trajectory, width: float, height: float) -> Figure:
