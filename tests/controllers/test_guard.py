@@ -1,0 +1,115 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from controllers.guard import CLOCK_TOLERANCE, Decision, StopReason, decide
+from controllers.limits import Limits
+from formation.pose import STANDSTILL, Motion
+
+anything = st.one_of(
+    st.floats(allow_nan=True, allow_infinity=True),
+    st.floats(-1, 1),
+    st.sampled_from([0.0, -0.0, math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324]),
+)
+motions = st.one_of(st.none(), st.builds(Motion, anything, anything))
+limits_drawn = st.builds(Limits, st.floats(1e-3, 10), st.floats(1e-3, 10))
+LIMITS = Limits(0.22, 2.84)
+DRIVING = Motion(0.1, 1.0)
+
+
+def good(
+    wanted: Motion | None = DRIVING,
+    *,
+    age: float | None = 0.05,
+    max_age: float = 0.2,
+    settled: bool = True,
+    lost: bool = False,
+    stopped: bool = False,
+) -> Decision:
+    return decide(wanted, LIMITS, age=age, max_age=max_age, settled=settled, lost=lost, stopped=stopped)
+
+
+@given(
+    motions,
+    limits_drawn,
+    st.one_of(st.none(), anything),
+    anything,
+    st.booleans(),
+    st.booleans(),
+    st.booleans(),
+)
+@settings(deadline=None, max_examples=500)
+def test_nothing_unsafe_leaves(
+    wanted: Motion | None,
+    limits: Limits,
+    age: float | None,
+    max_age: float,
+    settled: bool,
+    lost: bool,
+    stopped: bool,
+) -> None:
+    decision = decide(wanted, limits, age=age, max_age=max_age, settled=settled, lost=lost, stopped=stopped)
+    assert math.isfinite(decision.sent.v)
+    assert math.isfinite(decision.sent.u)
+    assert limits.allow(decision.sent)
+    if decision.stop is not None:
+        assert decision.sent == STANDSTILL
+        assert not decision.saturated
+        return
+    assert wanted is not None
+    assert age is not None
+    assert settled
+    assert not lost
+    assert not stopped
+    assert -CLOCK_TOLERANCE <= age <= max_age
+    assert (decision.sent, decision.saturated) == limits.apply(wanted)
+
+
+@given(st.builds(Motion, st.floats(-0.22, 0.22), st.floats(-2.84, 2.84)), st.floats(0.0, 0.2))
+@settings(deadline=None)
+def test_a_good_command_leaves_as_it_is(wanted: Motion, age: float) -> None:
+    assert good(wanted, age=age) == Decision(wanted, wanted, saturated=False, stop=None)
+
+
+def test_a_command_beyond_the_limits_is_limited_and_says_so() -> None:
+    assert good(Motion(-0.5, 3.0)) == Decision(
+        Motion(-0.22, 2.84), Motion(-0.5, 3.0), saturated=True, stop=None
+    )
+
+
+@pytest.mark.parametrize(
+    ("decision", "reason"),
+    [
+        (good(None), StopReason.NO_ESTIMATE),
+        (good(age=None), StopReason.NO_ESTIMATE),
+        (good(settled=False), StopReason.NOT_SETTLED),
+        (good(lost=True), StopReason.LOST),
+        (good(age=0.2001), StopReason.STALE),
+        (good(age=-0.1), StopReason.STALE),
+        (good(age=math.nan), StopReason.STALE),
+        (good(age=math.inf), StopReason.STALE),
+        (good(max_age=math.nan), StopReason.STALE),
+        (good(Motion(math.nan, 0.0)), StopReason.NOT_FINITE),
+        (good(Motion(0.0, -math.inf)), StopReason.NOT_FINITE),
+        (good(stopped=True), StopReason.STOPPED),
+    ],
+)
+def test_each_stop_gives_its_reason(decision: Decision, reason: StopReason) -> None:
+    assert decision.stop is reason
+    assert decision.sent == STANDSTILL
+
+
+def test_an_ordered_stop_outranks_every_other_reason() -> None:
+    assert good(None, age=None, settled=False, lost=True, stopped=True).stop is StopReason.STOPPED
+
+
+def test_clocks_may_differ_by_a_little() -> None:
+    assert good(age=-0.5 * CLOCK_TOLERANCE).stop is None
+
+
+def test_the_log_keeps_what_was_wanted_before_a_stop() -> None:
+    assert good(Motion(0.1, 1.0), age=9.0).wanted == Motion(0.1, 1.0)

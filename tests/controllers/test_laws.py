@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from controllers.laws import LAWS, Gains, constant_bearing, ideal, ideal_speed, independent, independent_speed
+from controllers.limits import Limits, clip
+from formation.pose import Motion
+from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2, Shape, reduced_rates, shape_rates
+from formation.spacing import Spacing, lyapunov
+
+angles = st.floats(-math.pi, math.pi, exclude_min=True)
+shapes = st.builds(Shape, st.floats(0.05, 5), angles, angles)
+gains_drawn = st.builds(
+    Gains,
+    st.floats(0.1, 5),
+    st.floats(0.1, 5),
+    st.builds(Spacing, st.floats(0.1, 1), st.floats(0.1, 30)),
+)
+leaders = st.builds(Motion, st.floats(0.01, 1), st.floats(-2, 2))
+GAINS = Gains(1.5, 2.0, Spacing(0.2, 20.0))
+
+
+@given(shapes, leaders, st.floats(-3, 3), gains_drawn)
+@settings(deadline=None)
+def test_steering_leaves_alpha2_to_itself(shape: Shape, leader: Motion, v2: float, gains: Gains) -> None:
+    """Under (4) alpha2_dot = mu2 cos(alpha2), whatever the speed is."""
+    u2 = constant_bearing(shape, leader.v, v2, gains)
+    alpha2_dot = shape_rates(shape, leader, Motion(v2, u2)).alpha2_dot
+    assert alpha2_dot == pytest.approx(gains.mu2 * math.cos(shape.alpha2), abs=1e-9)
+
+
+@given(shapes, leaders, gains_drawn)
+@settings(deadline=None)
+def test_ideal_speed_gives_the_papers_closed_loop(shape: Shape, leader: Motion, gains: Gains) -> None:
+    v2 = ideal_speed(shape, leader.v, leader.u, gains)
+    rho_dot, alpha1_dot = reduced_rates(shape.rho, shape.alpha1, leader, v2)
+    wanted = -gains.mu1 * math.cos(shape.alpha1) + leader.v * gains.spacing.f(shape.rho)
+    assert alpha1_dot == pytest.approx(wanted, rel=1e-9, abs=1e-9)
+    # Prop. 1: along it V1 falls at the rate mu1 cos^2(alpha1).
+    V1_dot = math.cos(shape.alpha1) * alpha1_dot + gains.spacing.f(shape.rho) * rho_dot
+    assert V1_dot == pytest.approx(-gains.mu1 * math.cos(shape.alpha1) ** 2, rel=1e-9, abs=1e-6)
+
+
+@given(shapes, leaders, gains_drawn)
+@settings(deadline=None)
+def test_speed_laws_differ_by_the_leaders_turning_only(shape: Shape, leader: Motion, gains: Gains) -> None:
+    with_it = ideal_speed(shape, leader.v, leader.u, gains)
+    without = independent_speed(shape, leader.v, gains)
+    assert with_it - without == pytest.approx(shape.rho * leader.u, abs=1e-9)
+    assert independent(shape, leader.v, math.nan, gains) == independent(shape, leader.v, leader.u, gains)
+
+
+@given(leaders, gains_drawn)
+@settings(deadline=None)
+def test_abreast_the_ideal_follower_drives_a_parallel_track(leader: Motion, gains: Gains) -> None:
+    rho_0 = gains.spacing.rho_0
+    motion = ideal(Shape(rho_0, ABREAST_ALPHA1, ABREAST_ALPHA2), leader.v, leader.u, gains)
+    assert motion.v == pytest.approx(leader.v + rho_0 * leader.u, abs=1e-12)
+    assert motion.u == pytest.approx(leader.u, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", sorted(LAWS))
+@given(shape=shapes, leader=leaders, gains=gains_drawn)
+@settings(deadline=None)
+def test_turn_rate_suits_the_speed_that_the_limits_let_through(
+    name: str, shape: Shape, leader: Motion, gains: Gains
+) -> None:
+    limits = Limits(0.22, 2.84)
+    wanted = LAWS[name](shape, leader.v, leader.u, gains, limits)
+    assert wanted.v == LAWS[name](shape, leader.v, leader.u, gains).v
+    driven = Motion(clip(wanted.v, limits.v_max), wanted.u)
+    alpha2_dot = shape_rates(shape, leader, driven).alpha2_dot
+    assert alpha2_dot == pytest.approx(gains.mu2 * math.cos(shape.alpha2), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "shape", [Shape(math.nan, 0.0, 0.0), Shape(0.2, math.nan, 0.0), Shape(0.2, 0.0, math.nan)]
+)
+def test_an_estimate_that_is_nan_shows_in_the_command(shape: Shape) -> None:
+    motion = independent(shape, 0.08, 0.0, GAINS, Limits(0.22, 2.84))
+    assert math.isnan(motion.v) or math.isnan(motion.u)
+
+
+def test_first_command_of_the_papers_experiment() -> None:
+    """Worked out by hand from (8) and (4) at the start shape of the robots."""
+    shape = Shape(0.832346, -0.596867, -0.611459)
+    motion = independent(shape, 0.08, 0.2, GAINS)
+    f = 20.0 * (0.832346**2 - 0.04) / 0.832346**2
+    v2 = 0.08 * math.sin(0.596867) + 0.832346 * (-1.5 * math.cos(0.596867) + 0.08 * f)
+    u2 = -2.0 * math.cos(0.611459) + (-0.08 * math.sin(0.596867) - v2 * math.sin(0.611459)) / 0.832346
+    assert (motion.v, motion.u) == pytest.approx((v2, u2), rel=1e-12)
+    assert lyapunov(shape, GAINS.spacing) == pytest.approx(10.05, abs=5e-3)
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf])
+def test_gains_without_sense_are_refused(bad: float) -> None:
+    with pytest.raises(ValueError, match="mu1"):
+        Gains(bad, 2.0, GAINS.spacing)
+    with pytest.raises(ValueError, match="mu2"):
+        Gains(1.5, bad, GAINS.spacing)

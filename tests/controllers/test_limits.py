@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from controllers.limits import Limits
+from formation.pose import Motion
+
+anything = st.floats(allow_nan=True, allow_infinity=True)
+LIMITS = Limits(0.22, 2.84)
+
+
+@given(st.builds(Motion, anything, anything))
+@settings(deadline=None)
+def test_result_is_within_limits_or_nan_where_nan_came_in(wanted: Motion) -> None:
+    allowed, saturated = LIMITS.apply(wanted)
+    for asked, given_, bound in ((wanted.v, allowed.v, 0.22), (wanted.u, allowed.u, 2.84)):
+        if math.isnan(asked):
+            assert math.isnan(given_)
+        else:
+            assert abs(given_) <= bound
+            assert given_ == asked or abs(asked) > bound
+            assert given_ == asked or math.copysign(1.0, given_) == math.copysign(1.0, asked)
+    assert saturated == (abs(wanted.v) > 0.22 or abs(wanted.u) > 2.84)
+
+
+@given(st.builds(Motion, anything, anything))
+@settings(deadline=None)
+def test_allows_exactly_what_it_would_not_change(wanted: Motion) -> None:
+    allowed, _ = LIMITS.apply(wanted)
+    # Component by component, as NaN is to differ from itself here.
+    assert LIMITS.allow(wanted) == (allowed.v == wanted.v and allowed.u == wanted.u)
+
+
+@pytest.mark.parametrize("bad", [0.0, -0.1, math.nan, math.inf])
+def test_limits_without_sense_are_refused(bad: float) -> None:
+    with pytest.raises(ValueError, match="v_max"):
+        Limits(bad, 1.0)
+    with pytest.raises(ValueError, match="u_max"):
+        Limits(1.0, bad)
