@@ -29,6 +29,7 @@ Odometry = ros.nav_msgs__msg__Odometry
 KeyValue = ros.diagnostic_msgs__msg__KeyValue
 DiagnosticStatus = ros.diagnostic_msgs__msg__DiagnosticStatus
 DiagnosticArray = ros.diagnostic_msgs__msg__DiagnosticArray
+String = ros.std_msgs__msg__String
 
 
 class Message(Protocol):

@@ -142,7 +142,8 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     """The estimator: which one, what it measures with, and its noise by rule.
 
     ``front_end`` world: leader position and follower pose from mocap; body: range and bearing of the leader
-    and the follower's own motion, taken as noisy and as ``input_delay_s`` old when it is stamped.
+    and the follower's own motion, taken as noisy, ``input_delay_s`` old when it is stamped, and as late as
+    ``input_lag_s`` in acting (set it where commands stand in for odometry).
     ``sigma_range``, ``sigma_bearing``: of a body-frame sensor; for mocap they follow from the geometry.
     ``turn_bandwidth``: q_u = turn_bandwidth * k_u^2 per second (0.5 agile, 0.03 gentle leaders).
     """
@@ -153,13 +154,14 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     sigma_heading: Positive = 0.0035
     sigma_range: Positive = 0.01
     sigma_bearing: Positive = 0.02
-    sigma_v2: Positive = 0.01
-    sigma_u2: Positive = 0.1
+    sigma_v2: Positive = 0.005
+    sigma_u2: Positive = 0.03
     input_delay_s: NonNegative = 0.0
+    input_lag_s: NonNegative = 0.0
     turn_bandwidth: Positive = 0.5
     gate_probability: Annotated[float, Meta(gt=0.5, lt=1.0)] = 0.9999
     reacquire_frames: Annotated[int, Meta(ge=2)] = 5
-    coast_after_s: Positive = 0.05
+    coast_after_s: Positive = 0.25
     lost_after_s: Positive = 1.0
     window_s: NonNegative = 0.2
     difference_cutoff_s: Positive = 0.1

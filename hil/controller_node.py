@@ -1,0 +1,191 @@
+"""The controller daemon: estimates in, commands out; it predicts, asks the law, and lets the guard decide."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+from controllers.guard import Decision, decide
+from controllers.laws import LAWS
+from estimation.estimate import Estimate
+from estimation.prediction import SentCommand, predict_shape
+from estimation.tracking import Status
+from formation.pose import Motion
+from hil import message_types as msg
+from hil import topics
+from hil.errors import UsageError
+from hil.estimate_message import from_message
+from hil.messages import MalformedPayloadError, decode_as, header, to_time
+from hil.node import Counts, Event, Outgoing, consumed, counted, diagnostics, no_counts, outgoing
+from hil.scenario import Scenario
+from hil.scenario_parts import gains, limits
+from hil.topics import topics_of
+
+NAME = "controller"
+_DIAGNOSTICS_NS = 500_000_000
+_NS = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerState:
+    """All that the controller remembers.
+
+    ``estimate``: the newest one that may move the robot; ``status``: of the newest one of any kind.
+    ``sent``: commands since that estimate's capture, oldest first, and the one before.
+    """
+
+    estimate: Estimate | None = None
+    status: Status = Status.INITIALISING
+    stopped: bool = False
+    sent: tuple[SentCommand, ...] = ()
+    receipts: tuple[msg.Consumed, ...] = ()
+    refused: Counts = field(default_factory=no_counts)
+    decided: Counts = field(default_factory=no_counts)
+    heard: bool = False
+    next_tick_ns: int = 0
+    next_diagnostics_ns: int = 0
+
+
+class ControllerNode:
+    """Pure step of the controller daemon."""
+
+    name = NAME
+
+    def __init__(self, scenario: Scenario) -> None:
+        given = scenario.controller
+        if given.law == "ideal":
+            raise UsageError(
+                "law 'ideal' needs the leader's turn rate, which a follower cannot see; "
+                "use --law independent here, or `abreast simulate` for the ideal law"
+            )
+        self.topics = topics_of(scenario)
+        self.law = LAWS[given.law]
+        self.gains, self.limits = gains(scenario), limits(scenario)
+        self.max_age = given.max_age_s
+        self.lag = given.lag_s
+        self.transport_ns = round(given.transport_s / _NS)
+        self.ahead_ns = self.transport_ns + round(given.lag_s / _NS)
+        self.tick_ns = round(1.0 / given.tick_hz / _NS)
+        self.subscribes = (self.topics.estimate, topics.STOP)
+
+    def begin(self, now_ns: int) -> ControllerState:
+        """State of a controller that has heard nothing: it keeps the robot still."""
+        return ControllerState(next_tick_ns=now_ns, next_diagnostics_ns=now_ns)
+
+    def due_ns(self, state: ControllerState) -> int:
+        """Time of the next tick: a command leaves at least that often."""
+        return state.next_tick_ns
+
+    def step(
+        self, state: ControllerState, event: Event, now_ns: int
+    ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
+        """Take in an estimate, a stop or a tick; each leads to a command."""
+        if event.topic:
+            state = replace(state, receipts=(*state.receipts, consumed(event, now_ns)))
+        fresh = False
+        if event.topic == topics.STOP:
+            state = replace(state, stopped=True)
+        elif event.topic == self.topics.estimate:
+            try:
+                estimate = from_message(decode_as(event.payload, msg.LeaderEstimate))
+            except (MalformedPayloadError, ValueError):
+                return replace(state, refused=counted(state.refused, "malformed")), ()
+            fresh = estimate.status is Status.TRACKING
+            kept = estimate if fresh else state.estimate
+            state = replace(state, status=estimate.status, heard=True, estimate=kept)
+        elif event.topic:
+            return state, ()
+        state, out = self._command(state, now_ns, fresh=fresh)
+        return self._report(state, out, now_ns)
+
+    def _command(
+        self, state: ControllerState, now_ns: int, *, fresh: bool
+    ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
+        decision = self._decide(state, now_ns)
+        acting = SentCommand(now_ns + self.transport_ns, decision.sent.v, decision.sent.u)
+        receipts = state.receipts
+        state = replace(
+            state,
+            sent=_recent((*state.sent, acting), state.estimate),
+            receipts=(),
+            decided=counted(state.decided, decision.stop.value if decision.stop else "driving"),
+            next_tick_ns=now_ns + self.tick_ns,
+        )
+        return state, self._messages(state, decision, receipts, now_ns, fresh=fresh)
+
+    def _decide(self, state: ControllerState, now_ns: int) -> Decision:
+        estimate = state.estimate
+        wanted: Motion | None = None
+        age: float | None = None
+        if estimate is not None:
+            age = (now_ns - estimate.measured_ns) * _NS
+            if age <= self.max_age:
+                shape = predict_shape(estimate, state.sent, now_ns + self.ahead_ns, self.lag)
+                wanted = self.law(shape, estimate.v1, estimate.u1, self.gains, self.limits)
+            else:
+                wanted = Motion(math.nan, math.nan)
+        return decide(
+            wanted,
+            self.limits,
+            age=age,
+            max_age=self.max_age,
+            settled=state.status is not Status.INITIALISING,
+            lost=state.status is Status.LOST,
+            stopped=state.stopped,
+        )
+
+    def _messages(
+        self,
+        state: ControllerState,
+        decision: Decision,
+        receipts: tuple[msg.Consumed, ...],
+        now_ns: int,
+        *,
+        fresh: bool,
+    ) -> tuple[Outgoing, ...]:
+        estimate, wanted = state.estimate, decision.wanted
+        twist = msg.Twist(
+            linear=msg.Vector3(x=decision.sent.v, y=0.0, z=0.0),
+            angular=msg.Vector3(x=0.0, y=0.0, z=decision.sent.u),
+        )
+        drive: msg.Message = twist
+        if self.topics.stamped:
+            drive = msg.TwistStamped(header=header(now_ns, self.topics.follower), twist=twist)
+        record = msg.Command(
+            header=header(now_ns, self.topics.follower),
+            capture=to_time(estimate.capture_ns if estimate else 0),
+            measured=to_time(estimate.measured_ns if estimate else 0),
+            v2=decision.sent.v,
+            u2=decision.sent.u,
+            v2_wanted=wanted.v if wanted else math.nan,
+            u2_wanted=wanted.u if wanted else math.nan,
+            saturated=decision.saturated,
+            stop=decision.stop.value if decision.stop else "",
+            fresh=fresh,
+            consumed=receipts,
+        )
+        return (
+            outgoing(self.topics.cmd_vel, drive, now_ns),
+            outgoing(self.topics.command, record, now_ns),
+        )
+
+    def _report(
+        self, state: ControllerState, out: tuple[Outgoing, ...], now_ns: int
+    ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
+        if now_ns < state.next_diagnostics_ns:
+            return state, out
+        problem = "" if state.heard else "waiting for estimates"
+        values = {"law_runs_on": state.status.name.lower(), **state.decided, **state.refused}
+        report = diagnostics(self.name, now_ns, problem, values)
+        state = replace(state, next_diagnostics_ns=now_ns + _DIAGNOSTICS_NS)
+        return state, (*out, outgoing(topics.DIAGNOSTICS, report, now_ns))
+
+
+def _recent(sent: tuple[SentCommand, ...], estimate: Estimate | None) -> tuple[SentCommand, ...]:
+    """Commands that a prediction from the estimate needs: the last before its capture, and later ones."""
+    if estimate is None:
+        return sent[-1:]
+    first = 0
+    while first + 1 < len(sent) and sent[first + 1].from_ns <= estimate.capture_ns:
+        first += 1
+    return sent[first:]
