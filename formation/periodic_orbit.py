@@ -17,6 +17,9 @@ from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2, Shape, reduced_rates
 RELAXING_PERIODS = 10
 SAMPLES_PER_PERIOD = 2000
 _CLOSED = 1e-9
+# A pair that drifts apart for ever nearly closes in ln(rho) too, far out: there a multiplier is next to 1,
+# while near a true fixed point the gap after a period divided by this bounds the distance to it.
+_ISOLATED = 1e-4
 # Between the integrator's error divided by the step and the step's square: about 1e-7 and 1e-10 here.
 _DIFFERENCE_STEP = 1e-5
 
@@ -67,7 +70,10 @@ def find_orbit(program: LeaderProgram, law: FollowerLaw, rho_guess: float) -> Pe
         fixed = _fixed_point(period_map, np.array([math.log(rho_guess), ABREAST_ALPHA1]))
         if fixed is None:
             return None
-        return _orbit(program, law, fixed, period, _multipliers(period_map, fixed))
+        multipliers = _multipliers(period_map, fixed)
+        if min(abs(1.0 - multiplier) for multiplier in multipliers) < _ISOLATED:
+            return None
+        return _orbit(program, law, fixed, period, multipliers)
     except ArithmeticError:
         return None
 
