@@ -132,22 +132,22 @@ def read_log(path: Path) -> Log:
             schemas, channels, messages, start_ns, end_ns = _scan(stream)
         stream.seek(0)
         metadata = {record.name: dict(record.metadata) for record in SeekingReader(stream).iter_metadata()}
-    ordered = [channels[number] for number in sorted(channels)]
-    return Log(
-        path=path,
-        metadata=metadata,
-        topics={channel.topic: _typename(schemas.get(channel.schema_id)) for channel in ordered},
-        encodings={channel.topic: channel.message_encoding for channel in ordered},
-        definitions={
-            _typename(schema): schema.data.decode()
-            for schema in schemas.values()
-            if schema.encoding == "ros2msg" and schema.data
-        },
-        messages=messages,
-        start_ns=start_ns if messages else None,
-        end_ns=end_ns if messages else None,
-        indexed=indexed,
-    )
+        ordered = [channels[number] for number in sorted(channels)]
+        return Log(
+            path=path,
+            metadata=metadata,
+            topics={channel.topic: _typename(schemas.get(channel.schema_id)) for channel in ordered},
+            encodings={channel.topic: channel.message_encoding for channel in ordered},
+            definitions={
+                _typename(schema): schema.data.decode()
+                for schema in schemas.values()
+                if schema.encoding == "ros2msg" and schema.data
+            },
+            messages=messages,
+            start_ns=start_ns if messages else None,
+            end_ns=end_ns if messages else None,
+            indexed=indexed,
+        )
 
 
 def check_mcap(path: Path) -> None:

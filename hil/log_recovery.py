@@ -22,6 +22,7 @@ from hil.mcap_chunks import MAGIC
 
 _RECORD_HEAD = struct.Struct("<BQ")
 _CHUNK_SPAN = struct.Struct("<QQ")
+_UNREADABLE_HEADER = Header(profile="ros2", library="")
 _PLAIN_RECORDS: dict[int, type[Header | Schema | Channel | Metadata | Attachment]] = {
     Opcode.HEADER: Header,
     Opcode.SCHEMA: Schema,
@@ -124,7 +125,7 @@ class _Copy:
 
     def finish(self) -> None:
         """Write the index and the end of the new log."""
-        self._start(Header(profile="ros2", library=""))
+        self._start(_UNREADABLE_HEADER)
         self._writer.finish()  # type: ignore[no-untyped-call]  # the package leaves it unannotated
 
     def _start(self, header: Header) -> None:
@@ -133,9 +134,8 @@ class _Copy:
             self._started = True
 
     def _take(self, record: McapRecord) -> None:
-        if isinstance(record, Header):
-            self._start(record)
-        elif isinstance(record, Message):
+        self._start(record if isinstance(record, Header) else _UNREADABLE_HEADER)
+        if isinstance(record, Message):
             self._take_message(record)
         elif isinstance(record, Schema) and record.id not in self._schema_ids:
             self._schema_ids[record.id] = self._writer.register_schema(
