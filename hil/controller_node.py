@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from controllers.guard import Decision, decide
 from controllers.laws import LAWS
@@ -26,8 +28,7 @@ _DIAGNOSTICS_NS = 500_000_000
 _NS = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
-class ControllerState:
+class ControllerState(Struct, frozen=True):
     """All that the controller remembers.
 
     ``estimate``: the newest one that may move the robot; ``status``: of the newest one of any kind.

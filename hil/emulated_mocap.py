@@ -6,6 +6,7 @@ the order in which things are asked for.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from enum import IntEnum
@@ -17,6 +18,7 @@ from formation.pose import Motion, Pose
 
 _FULL_NOISE_SPEED = 0.05
 _FULL_NOISE_TURN = 0.2
+_BLOCK = 64
 
 
 class Stream(IntEnum):
@@ -49,27 +51,36 @@ class Delivery:
 class Draw:
     """Random numbers of one frame: three standard normals per body, delay [s], and whether it is lost."""
 
-    leader: tuple[float, float, float]
-    follower: tuple[float, float, float]
+    leader: tuple[float, ...]
+    follower: tuple[float, ...]
     delay: float
     lost: bool
 
 
-def generator(seed: int, stream: Stream, index: int) -> np.random.Generator:
-    """Generator for the ``index``-th item of a stream."""
-    return np.random.Generator(np.random.Philox(key=[seed, int(stream)], counter=[0, 0, 0, index]))
+def normals(seed: int, stream: Stream, index: int, count: int) -> tuple[float, ...]:
+    """``count`` standard normals for the ``index``-th item of a stream."""
+    return _block(seed, stream, index // _BLOCK, count)[0][index % _BLOCK]
 
 
 def draw_frame(seed: int, index: int, delivery: Delivery) -> Draw:
     """Random numbers of a mocap frame."""
-    random = generator(seed, Stream.MOCAP, index)
-    normal = random.standard_normal(6).tolist()
-    uniform = random.random(2).tolist()
-    delay = delivery.latency - delivery.jitter * math.log1p(-uniform[0])
-    return Draw(tuple(normal[:3]), tuple(normal[3:]), delay, uniform[1] < delivery.loss)
+    rows, shares = _block(seed, Stream.MOCAP, index // _BLOCK, 6)
+    normal, (late, lost) = rows[index % _BLOCK], shares[index % _BLOCK]
+    delay = delivery.latency - delivery.jitter * math.log1p(-late)
+    return Draw(normal[:3], normal[3:], delay, lost < delivery.loss)
 
 
-def observe(pose: Pose, motion: Motion, noise: MocapNoise, normal: tuple[float, float, float]) -> Pose:
+@functools.lru_cache(maxsize=16)
+def _block(
+    seed: int, stream: Stream, block: int, count: int
+) -> tuple[list[tuple[float, ...]], list[tuple[float, ...]]]:
+    """Normals (_BLOCK, count) and uniforms (_BLOCK, 2) of a block; a generator is slow to set up."""
+    random = np.random.Generator(np.random.Philox(key=[seed, int(stream)], counter=[0, 0, 0, block]))
+    normal = random.standard_normal((_BLOCK, count)).tolist()
+    return list(map(tuple, normal)), list(map(tuple, random.random((_BLOCK, 2)).tolist()))
+
+
+def observe(pose: Pose, motion: Motion, noise: MocapNoise, normal: tuple[float, ...]) -> Pose:
     """Pose as mocap sees it: the noise rises from its static share to full with the body's motion."""
     activity = min(1.0, math.hypot(motion.v / _FULL_NOISE_SPEED, motion.u / _FULL_NOISE_TURN))
     scale = noise.static_fraction + (1.0 - noise.static_fraction) * activity

@@ -39,6 +39,10 @@ class Robot:
     motion: Motion = STANDSTILL
     command: Motion = STANDSTILL
 
+    def told(self, command: Motion) -> Robot:
+        """The same robot with another command."""
+        return Robot(self.pose, self.motion, command)
+
 
 def drive(robot: Robot, actuators: Actuators, dt: float) -> Robot:
     """Robot after dt [s] under its command.

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from bisect import insort
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from formation.pose import STANDSTILL, Motion
 from hil import message_types as msg
 from hil import topics
-from hil.emulated_mocap import Delivery, MocapNoise, Stream, draw_frame, generator, observe
+from hil.emulated_mocap import Delivery, MocapNoise, Stream, draw_frame, normals, observe
 from hil.emulated_robot import Actuators, Robot, drive
 from hil.emulated_wire import frame_message, odometry_message, truth_message
 from hil.messages import MalformedPayloadError, decode, decode_as
@@ -27,8 +29,7 @@ _NS = 1e-9
 _DIAGNOSTICS_NS = 500_000_000
 
 
-@dataclass(frozen=True, slots=True)
-class EmulatorState:
+class EmulatorState(Struct, frozen=True):
     """The world: both robots at ``time_ns``, what is on its way, and what is due next.
 
     ``alive``: daemons that have reported to be well. ``motion_since_ns``: when the leader set off, None
@@ -106,15 +107,15 @@ class EmulatorNode:
         if not isinstance(twist, msg.Twist):
             return state
         wanted = STANDSTILL if state.stopped else Motion(twist.linear.x, twist.angular.z)
-        follower = replace(state.follower, command=self.actuators.accept(wanted))
+        follower = state.follower.told(self.actuators.accept(wanted))
         return replace(state, follower=follower, commanded=True)
 
     def _on_stop(self, state: EmulatorState, payload: bytes) -> EmulatorState:
         return replace(
             state,
             stopped=True,
-            leader=replace(state.leader, command=STANDSTILL),
-            follower=replace(state.follower, command=STANDSTILL),
+            leader=state.leader.told(STANDSTILL),
+            follower=state.follower.told(STANDSTILL),
         )
 
     def _on_diagnostics(self, state: EmulatorState, payload: bytes) -> EmulatorState:
@@ -178,7 +179,7 @@ class EmulatorNode:
             since_ns = at_ns
             state = replace(state, motion_since_ns=at_ns, next_diagnostics_ns=at_ns)
         command = self.actuators.accept(self.program((at_ns - since_ns) * _NS))
-        return replace(state, leader=replace(state.leader, command=command))
+        return replace(state, leader=state.leader.told(command))
 
     def _sample_odometry(self, state: EmulatorState, out: list[Outgoing]) -> EmulatorState:
         number, at_ns, robot = state.odometry, state.time_ns, self.scenario.robot
@@ -186,7 +187,7 @@ class EmulatorNode:
             (self.topics.leader, Stream.LEADER_ODOMETRY, state.leader),
             (self.topics.follower, Stream.FOLLOWER_ODOMETRY, state.follower),
         ):
-            normal = generator(self.scenario.run.seed, stream, number).standard_normal(2).tolist()
+            normal = normals(self.scenario.run.seed, stream, number, 2)
             moving = 0.0 if body.motion == STANDSTILL else 1.0
             measured = Motion(
                 body.motion.v + moving * robot.odometry_sigma_v * normal[0],

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from estimation.belief import Model
 from estimation.estimate import Estimate, estimate_of
@@ -42,8 +44,7 @@ REASONS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class EstimatorState:
+class EstimatorState(Struct, frozen=True):
     """All that the estimator remembers.
 
     ``receipts``: inputs since the last estimate. ``refused``: inputs that were not used, by cause.
