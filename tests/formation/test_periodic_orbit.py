@@ -4,9 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from controllers.laws import LAWS, Gains
+from formation.angles import FloatArray
 from formation.closed_loop import FollowerLaw, simulate_pair
 from formation.leader import Constant, Sinusoid
 from formation.periodic_orbit import find_orbit
@@ -34,6 +36,27 @@ def test_orbit_is_where_a_long_run_ends(program: Sinusoid, gains: Gains) -> None
     np.testing.assert_allclose(run.rho[1:], orbit.rho[::100], atol=1e-8)
     np.testing.assert_allclose(run.alpha1[1:], orbit.alpha1[::100], atol=1e-8)
     np.testing.assert_allclose(run.alpha2[1:], math.pi / 2, atol=1e-7)
+
+
+def test_extremes_of_the_papers_simulation() -> None:
+    """Against another integrator on other variables; a grid of 10 ms gives the figures known beforehand."""
+    program, gains = FIG2
+    orbit = find_orbit(program, with_gains("independent", gains), gains.spacing.rho_0)
+    assert orbit is not None
+
+    def rates(t: float, state: FloatArray) -> tuple[float, float]:
+        rho, alpha1 = state.tolist()
+        f = 2.0 * (rho**2 - 0.25) / rho**2
+        return -0.5 * math.cos(alpha1), -0.5 - math.sin(math.pi * t) - math.cos(alpha1) + 0.5 * f
+
+    times = np.linspace(78.0, 80.0, 2001)
+    late = solve_ivp(
+        rates, (0.0, 80.0), (1.0, math.pi / 4), method="LSODA", t_eval=times, rtol=1e-11, atol=1e-12
+    )
+    for known, ours in zip(late.y, (orbit.rho, orbit.alpha1), strict=True):
+        np.testing.assert_allclose(ours, known, atol=1e-7)
+    on_grid = [(float(column.min()), float(column.max())) for column in (orbit.rho[::10], orbit.alpha1[::10])]
+    assert np.round(on_grid, 5).tolist() == [[0.65878, 0.76083], [-1.89506, -1.24631]]
 
 
 @SETTINGS
