@@ -97,7 +97,7 @@ class ControllerNode:
         elif event.topic:
             return state, ()
         state, out = self._command(state, now_ns, fresh=fresh)
-        return self._report(state, out, now_ns)
+        return self._speak(state, out, now_ns)
 
     def _command(
         self, state: ControllerState, now_ns: int, *, fresh: bool
@@ -170,16 +170,20 @@ class ControllerNode:
             outgoing(self.topics.command, record, now_ns),
         )
 
-    def _report(
+    def _speak(
         self, state: ControllerState, out: tuple[Outgoing, ...], now_ns: int
     ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
         if now_ns < state.next_diagnostics_ns:
             return state, out
-        problem = "" if state.heard else "waiting for estimates"
-        values = {"law_runs_on": state.status.name.lower(), **state.decided, **state.refused}
-        report = diagnostics(self.name, now_ns, problem, values)
         state = replace(state, next_diagnostics_ns=now_ns + _DIAGNOSTICS_NS)
-        return state, (*out, outgoing(topics.DIAGNOSTICS, report, now_ns))
+        return state, (*out, self.report(state, now_ns))
+
+    def report(self, state: ControllerState, now_ns: int) -> Outgoing:
+        """Diagnostics: what was decided how often, and what was refused."""
+        problem = "" if state.heard else "waiting for estimates"
+        values: dict[str, object] = {"estimate": state.status.name.lower()}
+        values |= named_counts("decided", state.decided) | named_counts("refused", state.refused)
+        return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
 
 
 def _recent(sent: tuple[SentCommand, ...], estimate: Estimate | None) -> tuple[SentCommand, ...]:

@@ -164,7 +164,7 @@ class EmulatorNode:
             insort(pending, (at_ns + round(draw.delay / _NS), number, frame), key=lambda item: item[:2])
             state = replace(state, pending=tuple(pending))
         if at_ns >= state.next_diagnostics_ns:
-            out.append(self._report(state, at_ns))
+            out.append(self.report(state, at_ns))
             state = replace(state, next_diagnostics_ns=at_ns + _DIAGNOSTICS_NS)
         return state
 
@@ -203,16 +203,14 @@ class EmulatorNode:
     def _odometry_ns(self, state: EmulatorState) -> int:
         return state.begun_ns + round(state.odometry / self.scenario.robot.odometry_rate_hz / _NS)
 
-    def _report(self, state: EmulatorState, at_ns: int) -> Outgoing:
+    def report(self, state: EmulatorState, now_ns: int) -> Outgoing:
+        """Diagnostics: what the start barrier still waits for, since when the leader moves, frames lost."""
         missing = sorted(self.needs - state.alive)
         if not state.commanded:
             missing.append("a command")
         problem = f"waiting for {', '.join(missing)}" if missing else ""
-        values = {
-            "motion_since_ns": state.motion_since_ns or "",
-            "stopped": state.stopped,
-            "frames": state.frames,
-            "lost": state.lost,
-            **state.refused,
-        }
-        return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, at_ns, problem, values), at_ns)
+        values: dict[str, object] = {"stopped": state.stopped, "frames": state.frames, "lost": state.lost}
+        if state.motion_since_ns is not None:
+            values["motion_since_ns"] = state.motion_since_ns
+        values |= named_counts("refused", state.refused)
+        return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)

@@ -182,9 +182,14 @@ class EstimatorNode:
         if status in (Status.COASTING, Status.LOST) and (now_ns - state.last_out_ns) * 2 > _TICK_NS:
             state, out = self._publish(state, now_ns)
         if now_ns >= state.next_diagnostics_ns:
-            problem = "" if state.track and state.history else "waiting for mocap and odometry"
-            values = {"status": status.name.lower(), **state.taken, **state.refused}
-            report = diagnostics(self.name, now_ns, problem, values)
-            out = (*out, outgoing(topics.DIAGNOSTICS, report, now_ns))
+            out = (*out, self.report(state, now_ns))
             state = replace(state, next_diagnostics_ns=now_ns + _DIAGNOSTICS_NS)
         return replace(state, next_tick_ns=now_ns + _TICK_NS), out
+
+    def report(self, state: EstimatorState, now_ns: int) -> Outgoing:
+        """Diagnostics: status of the track, inputs taken and refused."""
+        problem = "" if state.track and state.history else "waiting for mocap and odometry"
+        status = self.tracker.status(state.track, now_ns)
+        values: dict[str, object] = {"status": status.name.lower()}
+        values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)
+        return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)

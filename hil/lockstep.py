@@ -53,6 +53,11 @@ class Lockstep:
         """Send a message from outside, as an operator would."""
         self._deliver((message,))
 
+    def farewell(self) -> None:
+        """Let every node say its last word."""
+        for node, state in zip(self.nodes, self.states, strict=True):
+            self.sink(node.report(state, self.now_ns), self.now_ns)
+
     def _step(self, index: int, event: Event) -> tuple[Outgoing, ...]:
         self.states[index], out = self.nodes[index].step(self.states[index], event, self.now_ns)
         return out

@@ -52,6 +52,9 @@ class Node(Protocol[S]):
     def due_ns(self, state: S) -> int:
         """When the node wants its next tick if nothing else happens before."""
 
+    def report(self, state: S, now_ns: int) -> Outgoing:
+        """Diagnostics of the node: how it is and what it has counted; also its last word."""
+
     def step(self, state: S, event: Event, now_ns: int) -> tuple[S, tuple[Outgoing, ...]]:
         """State after an event, and what to publish. Never raises for anything that came from the wire."""
 
@@ -80,6 +83,11 @@ def no_counts() -> Counts:
 def counted(counts: Counts, cause: str) -> Counts:
     """Counts with one more of a cause."""
     return {**counts, cause: counts.get(cause, 0) + 1}
+
+
+def named_counts(group: str, counts: Counts) -> dict[str, object]:
+    """Counts as values of a diagnostics message, each key ``group.cause``."""
+    return {f"{group}.{cause}": count for cause, count in counts.items()}
 
 
 def diagnostics(name: str, now_ns: int, problem: str, values: Mapping[str, object]) -> DiagnosticArray:

@@ -1,0 +1,85 @@
+"""The console script ``abreast``: finds the command, and turns every foreseen error into one line."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Sequence
+
+import click
+
+from hil import __version__
+from hil.errors import AbreastError
+
+COMMANDS = {
+    "run": "the main job: emulated robots, estimator, controller and recorder, live over Zenoh or in lockstep",
+    "replay": "run a log through the same steps: verify it, re-estimate it, judge it",
+    "simulate": "the noise-free experiments of the paper, with pictures",
+    "import": "turn other recordings into logs",
+    "recover": "make a cut-off log whole",
+    "emulator": "the emulated robots and motion capture, as a daemon",
+    "estimator": "the estimator, as a daemon",
+    "controller": "the controller, as a daemon",
+    "recorder": "the recorder, as a daemon",
+}
+_MODULES = {"import": "import_recording"}
+_DAEMONS = ("emulator", "estimator", "controller", "recorder")
+
+
+class _LazyGroup(click.Group):
+    """Imports a command's module only when that command is called, so that each starts fast."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        if cmd_name in _DAEMONS:
+            module = importlib.import_module("hil.commands.daemon")
+            return module.daemon_command(cmd_name, COMMANDS[cmd_name])  # type: ignore[no-any-return]
+        module = importlib.import_module(f"hil.commands.{_MODULES.get(cmd_name, cmd_name)}")
+        command: click.Command = module.command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="abreast")
+def abreast() -> None:
+    """Estimate a leader's motion, keep abreast of it, and judge how well that went."""
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the console script and exit: 0 done, 1 a check failed, 2 bad usage or bad input."""
+    try:
+        code = abreast.main(
+            args=None if arguments is None else list(arguments), prog_name="abreast", standalone_mode=False
+        )
+    except click.UsageError as error:
+        where = error.ctx.command_path if error.ctx else "abreast"
+        _say(f"{where}: {error.format_message()} (see `{where} --help`)")
+        code = 2
+    except click.ClickException as error:
+        _say(f"abreast: {error.format_message()}")
+        code = 2
+    except click.Abort:
+        code = 1
+    except AbreastError as error:
+        _say(f"abreast: {error}")
+        code = error.exit_code
+    except BrokenPipeError:
+        sys.stderr.close()
+        code = 1
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _say(line: str) -> None:
+    click.echo(" ".join(line.split()), err=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""The commands of ``abreast``, one module each, loaded when called."""

@@ -1,0 +1,43 @@
+"""Results as JSON: what cannot be known is absent, never made up."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+
+def known(value: Any) -> Any:
+    """Value with plain Python types, and without entries that are None or not finite, or empty for that."""
+    if isinstance(value, Mapping):
+        kept = {str(key): known(item) for key, item in value.items()}
+        return {key: item for key, item in kept.items() if item is not None and item != {}}
+    if isinstance(value, np.ndarray):
+        return known(value.tolist())
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [known(item) for item in value]
+    if isinstance(value, np.generic):
+        return known(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def as_json(result: Mapping[str, Any], indent: int | None = None) -> str:
+    """JSON text of a result."""
+    return json.dumps(known(result), indent=indent, allow_nan=False)
+
+
+def print_json(result: Mapping[str, Any]) -> None:
+    """Print a result as one JSON object on one line of stdout."""
+    click.echo(as_json(result))
+
+
+def write_json(result: Mapping[str, Any], path: Path) -> None:
+    """Write a result to a file, indented."""
+    path.write_text(as_json(result, indent=2) + "\n", encoding="utf-8")
