@@ -12,7 +12,7 @@ from hil import __version__
 from hil.errors import AbreastError
 
 COMMANDS = {
-    "run": "the main job: emulated robots, estimator, controller and recorder, live over Zenoh or in lockstep",
+    "run": "the main job: emulated robots, estimator, controller, recorder; live or in lockstep",
     "replay": "run a log through the same steps: verify it, re-estimate it, judge it",
     "simulate": "the noise-free experiments of the paper, with pictures",
     "import": "turn other recordings into logs",

@@ -18,7 +18,17 @@ from hil import topics
 from hil.errors import UsageError
 from hil.estimate_message import from_message
 from hil.messages import MalformedPayloadError, decode_as, header, to_time
-from hil.node import Counts, Event, Outgoing, consumed, counted, diagnostics, no_counts, outgoing
+from hil.node import (
+    Counts,
+    Event,
+    Outgoing,
+    consumed,
+    counted,
+    diagnostics,
+    named_counts,
+    no_counts,
+    outgoing,
+)
 from hil.scenario import Scenario
 from hil.scenario_parts import gains, limits
 from hil.topics import topics_of
@@ -67,7 +77,7 @@ class ControllerNode:
         self.transport_ns = round(given.transport_s / _NS)
         self.ahead_ns = self.transport_ns + round(given.lag_s / _NS)
         self.tick_ns = round(1.0 / given.tick_hz / _NS)
-        self.subscribes = (self.topics.estimate, topics.STOP)
+        self.subscribes: tuple[str, ...] = (self.topics.estimate, topics.STOP)
 
     def begin(self, now_ns: int) -> ControllerState:
         """State of a controller that has heard nothing: it keeps the robot still."""

@@ -19,7 +19,7 @@ from hil.emulated_mocap import Delivery, MocapNoise, Stream, draw_frame, normals
 from hil.emulated_robot import Actuators, Robot, drive
 from hil.emulated_wire import frame_message, odometry_message, truth_message
 from hil.messages import MalformedPayloadError, decode, decode_as
-from hil.node import Counts, Event, Outgoing, counted, diagnostics, no_counts, outgoing
+from hil.node import Counts, Event, Outgoing, counted, diagnostics, named_counts, no_counts, outgoing
 from hil.scenario import Scenario
 from hil.scenario_parts import leader_program, start_poses
 from hil.topics import topics_of

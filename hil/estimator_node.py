@@ -26,7 +26,17 @@ from hil import topics
 from hil.estimate_message import AssumedErrors, to_message
 from hil.intake import RefusedError, read_frame, read_odometry, read_sighting
 from hil.message_types import Consumed
-from hil.node import Counts, Event, Outgoing, consumed, counted, diagnostics, no_counts, outgoing
+from hil.node import (
+    Counts,
+    Event,
+    Outgoing,
+    consumed,
+    counted,
+    diagnostics,
+    named_counts,
+    no_counts,
+    outgoing,
+)
 from hil.scenario import Scenario
 from hil.topics import topics_of
 
