@@ -3,7 +3,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from controllers.limits import Limits
@@ -14,6 +14,9 @@ LIMITS = Limits(0.22, 2.84)
 
 
 @given(st.builds(Motion, anything, anything))
+@example(Motion(math.nan, 0.1))
+@example(Motion(0.1, math.nan))
+@example(Motion(math.inf, -math.inf))
 @settings(deadline=None)
 def test_result_is_within_limits_or_nan_where_nan_came_in(wanted: Motion) -> None:
     allowed, saturated = LIMITS.apply(wanted)
@@ -28,6 +31,9 @@ def test_result_is_within_limits_or_nan_where_nan_came_in(wanted: Motion) -> Non
 
 
 @given(st.builds(Motion, anything, anything))
+@example(Motion(math.nan, 0.1))
+@example(Motion(0.1, math.nan))
+@example(Motion(math.inf, -math.inf))
 @settings(deadline=None)
 def test_allows_exactly_what_it_would_not_change(wanted: Motion) -> None:
     allowed, _ = LIMITS.apply(wanted)
