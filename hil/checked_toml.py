@@ -1,0 +1,124 @@
+"""TOML files against a schema: each mistake is answered by one line that helps to correct it."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+import msgspec
+
+from hil.errors import UsageError
+
+T = TypeVar("T", bound=msgspec.Struct)
+
+_UNKNOWN = re.compile(r"unknown field `(?P<key>[^`]*)`(?: - at `\$\.?(?P<path>[^`]*)`)?")
+_AT = re.compile(r"^(?P<what>.*?)(?: - at `\$\.?(?P<path>[^`]*)`)?$", re.DOTALL)
+
+
+def data_folder() -> Path:
+    """Folder of ``scenarios`` and ``maps``: inside an installed wheel, or at the top of a checkout."""
+    here = Path(__file__).resolve().parent
+    installed = here / "data"
+    return installed if installed.is_dir() else here.parent / "data"
+
+
+def shipped_names(folder: str) -> list[str]:
+    """Names of the TOML files that abreast ships in a folder of :func:`data_folder`, sorted."""
+    return sorted(path.stem for path in (data_folder() / folder).glob("*.toml"))
+
+
+def locate(noun: str, folder: str, name_or_path: str) -> Path:
+    """Path of a shipped file by its name, or of the user's own; :class:`UsageError` if there is neither.
+
+    ``noun`` is what the messages call such a file, ``folder`` where the shipped ones are.
+    """
+    shipped = data_folder() / folder / f"{name_or_path}.toml"
+    if shipped.is_file():
+        return shipped
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    names = shipped_names(folder)
+    near = difflib.get_close_matches(name_or_path, names, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else f"; give a TOML file or one of: {', '.join(names)}"
+    raise UsageError(f"{noun} {name_or_path!r}: no such name and no such file{hint}")
+
+
+def read_toml(path: Path, noun: str) -> dict[str, Any]:
+    """Tree of plain values of a TOML file; :class:`UsageError` if it isn't readable as such."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise UsageError(f"{noun} {path}: not readable as TOML ({error}); correct the file") from error
+
+
+def checked(tree: Mapping[str, Any], kind: type[T], source: str) -> T:
+    """Turn a tree of plain values into a struct of the given kind.
+
+    Raises :class:`UsageError`, beginning with ``source``, for an unknown key (naming the nearest known one),
+    a wrong type, a value out of range or a number that isn't finite.
+    """
+    _refuse_non_finite(tree, source, "")
+    try:
+        return msgspec.convert(tree, kind)
+    except msgspec.ValidationError as error:
+        raise UsageError(f"{source}: {_explain(str(error), tree, kind)}") from None
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """Hint at what could be meant by a word that is not among the known ones."""
+    names = list(known)
+    near = difflib.get_close_matches(word, names, n=1, cutoff=0.4)
+    return f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(names)}"
+
+
+def _refuse_non_finite(node: object, source: str, path: str) -> None:
+    if isinstance(node, Mapping):
+        for key, value in node.items():
+            _refuse_non_finite(value, source, f"{path}.{key}" if path else str(key))
+    elif isinstance(node, Sequence) and not isinstance(node, str):
+        for value in node:
+            _refuse_non_finite(value, source, path)
+    elif isinstance(node, float) and not math.isfinite(node):
+        raise UsageError(f"{source}: {path} is {node}, expected a finite number")
+
+
+def _explain(error: str, tree: Mapping[str, Any], kind: type[msgspec.Struct]) -> str:
+    unknown = _UNKNOWN.search(error)
+    if unknown:
+        section = unknown["path"] or ""
+        known = _known_keys(section, tree, kind)
+        where = f"[{section}] has an" if section else "there is an"
+        return f"{where} unknown key {unknown['key']!r}; {nearest(unknown['key'], known)}"
+    parts = _AT.match(error)
+    if parts is None:
+        return error
+    path = parts["path"] or ""
+    value: Any = tree
+    for step in path.split(".") if path else []:
+        value = value.get(step) if isinstance(value, Mapping) else None
+    what = parts["what"].replace("`", "").replace("Expected", "expected").replace("Object missing", "missing")
+    shown = f" is {value!r}:" if path and not isinstance(value, Mapping) and value is not None else ":"
+    return f"{path or 'top level'}{shown} {what}"
+
+
+def _known_keys(section: str, tree: Mapping[str, Any], kind: Any) -> list[str]:
+    """Keys that the section of the given dotted path may have."""
+    node: Any = tree
+    for step in section.split(".") if section else []:
+        node = node.get(step, {}) if isinstance(node, Mapping) else {}
+        kind = next(field.type for field in msgspec.structs.fields(kind) if field.name == step)
+        options = [
+            option
+            for option in get_args(kind)
+            if isinstance(option, type) and issubclass(option, msgspec.Struct)
+        ]
+        if options:
+            tag = node.get("kind") if isinstance(node, Mapping) else None
+            kind = next((option for option in options if option.__struct_config__.tag == tag), options[0])
+    return [field.name for field in msgspec.structs.fields(kind)]
