@@ -1,0 +1,97 @@
+"""``abreast emulator``, ``estimator``, ``controller``, ``recorder``: one daemon each, in the foreground."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from hil.errors import UsageError
+from hil.live_daemon import Ending, NodeWorker, Worker, run_daemon
+from hil.scenario import Scenario
+from hil.scenario_file import load_scenario
+from hil.session import Endpoints
+from hil.topics import topics_of
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+def daemon_command(name: str, summary: str) -> click.Command:
+    """The command of one daemon."""
+
+    def callback(
+        scenario: str,
+        connect: str | None,
+        listen: str | None,
+        zenoh_config: Path | None,
+        duration: float | None,
+        overrides: tuple[str, ...],
+        out: Path | None = None,
+        needs: str = "estimator,controller",
+        tethered: bool = False,
+    ) -> None:
+        ending = Ending()
+        ending.on_signals()
+        if tethered:
+            ending.on_parent_gone()
+        if not (connect or listen or zenoh_config):
+            connect = DEFAULT_ENDPOINT
+        chosen = load_scenario(scenario, overrides)
+        worker = _WORKERS[name](chosen, out, frozenset(filter(None, needs.split(","))))
+        click.echo(f"abreast {name}: {chosen.name}, on {connect or listen or zenoh_config}", err=True)
+        run_daemon(worker, topics_of(chosen), Endpoints(connect, listen, zenoh_config), ending, duration)
+
+    path = click.Path(path_type=Path, dir_okay=False)
+    positive = click.FloatRange(min=0, min_open=True)
+    options: list[click.Parameter] = [
+        click.Argument(["scenario"]),
+        click.Option(["--connect"], metavar="ENDPOINT", help=f"Router to connect to [{DEFAULT_ENDPOINT}]."),
+        click.Option(["--listen"], metavar="ENDPOINT", help="Be the router, at this endpoint."),
+        click.Option(["--zenoh-config"], type=path, help="Zenoh config file, in place of both."),
+        click.Option(["--duration"], type=positive, help="End after S seconds."),
+        click.Option(["--set", "overrides"], multiple=True, metavar="KEY=VALUE", help="Override a key."),
+        click.Option(["--tethered"], is_flag=True, hidden=True),
+    ]
+    if name == "recorder":
+        options.append(click.Option(["--out"], type=path, required=True, help="Log to write (.mcap)."))
+    if name == "emulator":
+        needs = "Daemons that must be well before the leader sets off, by commas."
+        options.append(
+            click.Option(["--needs"], default="estimator,controller", show_default=True, help=needs)
+        )
+    return click.Command(name, callback=callback, params=options, help=f"Run {summary}.")
+
+
+def _emulator(scenario: Scenario, out: Path | None, needs: frozenset[str]) -> Worker:
+    from hil.emulator_node import EmulatorNode
+
+    return NodeWorker(EmulatorNode(scenario, needs))
+
+
+def _estimator(scenario: Scenario, out: Path | None, needs: frozenset[str]) -> Worker:
+    from hil.estimator_node import EstimatorNode
+
+    return NodeWorker(EstimatorNode(scenario))
+
+
+def _controller(scenario: Scenario, out: Path | None, needs: frozenset[str]) -> Worker:
+    from hil.controller_node import ControllerNode
+
+    return NodeWorker(ControllerNode(scenario), parting="the controller ended")
+
+
+def _recorder(scenario: Scenario, out: Path | None, needs: frozenset[str]) -> Worker:
+    from hil.recorder import Recorder
+
+    if out is None:
+        raise UsageError("abreast recorder: give the log to write with --out")
+    return Recorder(scenario, out)
+
+
+_WORKERS: dict[str, Callable[[Scenario, Path | None, frozenset[str]], Worker]] = {
+    "emulator": _emulator,
+    "estimator": _estimator,
+    "controller": _controller,
+    "recorder": _recorder,
+}

@@ -1,0 +1,125 @@
+"""``abreast run``: the main job, live over Zenoh or in lockstep, with its log, figures and verdict."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+
+from hil.errors import CheckFailedError, UsageError
+from hil.report_json import print_json, write_json
+from hil.scenario import Scenario
+from hil.scenario_file import load_scenario
+
+DURATION = click.FloatRange(min=0, min_open=True)
+
+
+@click.command("run")
+@click.argument("scenario", default="turtlebot3")
+@click.option("--duration", type=DURATION, metavar="S", help="Seconds from the leader's start to the stop.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all noise.")
+@click.option("--estimator", metavar="E", help="Estimator: ekf, ukf or difference.")
+@click.option("--law", metavar="L", help="Law of the follower.")
+@click.option(
+    "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Folder for results."
+)
+@click.option(
+    "--lockstep", is_flag=True, help="On a simulated clock, as fast as it goes; same seed, same bytes."
+)
+@click.option(
+    "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override any key of the scenario."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object on stdout.")
+def command(
+    scenario: str,
+    duration: float | None,
+    seed: int | None,
+    estimator: str | None,
+    law: str | None,
+    out: Path | None,
+    lockstep: bool,
+    overrides: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Drive SCENARIO (a shipped name or a TOML file) through the whole chain, log it and judge it."""
+    given = {"run.duration_s": duration, "run.seed": seed, "estimator.kind": estimator, "controller.law": law}
+    options = [f"{key}={value}" for key, value in given.items() if value is not None]
+    chosen = load_scenario(scenario, [*overrides, *options])
+    folder = _folder(chosen, out)
+    log_path = folder / "run.mcap"
+    if log_path.exists():
+        raise UsageError(f"{log_path} exists already; give another --out, or move it away")
+    failure = _lockstep(chosen, log_path) if lockstep else _live(chosen, folder, log_path)
+    summary = _judge(log_path, folder)
+    if as_json:
+        print_json(summary)
+    if failure:
+        raise CheckFailedError(
+            f"the run broke down: {failure}; the robots were stopped, the log is {log_path}"
+        )
+
+
+def _folder(scenario: Scenario, out: Path | None) -> Path:
+    folder = out or Path("runs") / f"{scenario.name}-{time.strftime('%Y%m%d-%H%M%S')}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"--out {folder}: cannot be made ({error.strerror}); give another folder") from None
+    return folder
+
+
+def _lockstep(scenario: Scenario, log_path: Path) -> str:
+    from hil.lockstep_run import run_lockstep
+
+    begun = time.perf_counter()
+    run_lockstep(scenario, log_path)
+    took = time.perf_counter() - begun
+    click.echo(
+        f"{scenario.run.duration_s:g} s in lockstep in {took:.2f} s "
+        f"({scenario.run.duration_s / took:.0f} times real time)",
+        err=True,
+    )
+    return ""
+
+
+def _live(scenario: Scenario, folder: Path, log_path: Path) -> str:
+    from rich.console import Console
+
+    from hil.controller_node import ControllerNode
+    from hil.live_daemon import Ending
+    from hil.live_run import run_live
+    from hil.live_watch import Picture
+
+    ControllerNode(scenario)  # a law that cannot run is better refused here than by a daemon
+    ending = Ending()
+    ending.on_signals()
+    console = Console(file=sys.stderr)
+    with console.status("starting router, emulator, estimator, controller and recorder") as status:
+
+        def show(picture: Picture, elapsed: float | None) -> None:
+            if elapsed is not None:
+                status.update(picture.line(elapsed, scenario.run.duration_s))
+
+        outcome = run_live(scenario, folder, log_path, ending, show)
+    if outcome.interrupted:
+        console.print(f"interrupted after {outcome.duration_s:.1f} s; the robots stand, the log is whole")
+    return outcome.failure
+
+
+def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
+    """Judge the log, and leave summary and picture beside it."""
+    from hil.evidence import evidence_of_log
+    from hil.judge import summarise
+    from hil.log_reader import read_log
+    from hil.run_figures import draw_run
+    from hil.run_summary_text import print_summary
+
+    evidence = evidence_of_log(read_log(log_path))
+    summary = summarise(evidence)
+    write_json(summary, folder / "summary.json")
+    draw_run(evidence, summary, folder / "run.png")
+    print_summary(summary)
+    return summary

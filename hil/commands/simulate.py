@@ -1,0 +1,43 @@
+"""``abreast simulate``: the noise-free experiments of the paper."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from hil.report_json import print_json
+from hil.scenario_file import load_scenario
+
+
+@click.command("simulate")
+@click.argument("scenario", default="turtlebot3")
+@click.option("--law", help="Law in place of the scenario's.")
+@click.option("--duration", type=click.FloatRange(min=0, min_open=True), help="Seconds to simulate.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for pictures and CSV.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+def command(
+    scenario: str,
+    law: str | None,
+    duration: float | None,
+    out: Path | None,
+    overrides: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Integrate SCENARIO without noise, delay or limits, as the paper does, and report on it."""
+    from hil.simulation import simulate
+
+    chosen = [*overrides]
+    if law is not None:
+        chosen.append(f"controller.law={law}")
+    if duration is not None:
+        chosen.append(f"run.duration_s={duration}")
+    result = simulate(load_scenario(scenario, chosen), out)
+    if as_json:
+        print_json(result)
+        return
+    for key, value in result.items():
+        click.echo(f"{key}: {value}", err=True)
+    if out is not None:
+        click.echo(f"pictures and trajectory.csv are in {out}", err=True)

@@ -1,0 +1,90 @@
+"""Zenoh sessions: one router and its clients on named endpoints, never multicast."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import zenoh
+
+from hil.errors import AbreastError, UsageError
+
+_RETRY_S = 0.2
+_CLOSE_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoints:
+    """Where a session connects to and listens, such as ``tcp/192.0.2.7:7447``; or a Zenoh config file.
+
+    A session that listens is a router: others connect to it. One that only connects is a client.
+    """
+
+    connect: str | None = None
+    listen: str | None = None
+    config_file: Path | None = None
+
+    def describe(self) -> str:
+        """The endpoints in words."""
+        return str(self.config_file or self.listen or self.connect)
+
+
+def open_session(
+    endpoints: Endpoints, patience: float = 10.0, give_up: Callable[[], bool] = lambda: False
+) -> zenoh.Session:
+    """Open a session, trying again for ``patience`` [s] while nobody answers, or until ``give_up`` says so.
+
+    Raises :class:`UsageError` for a config that Zenoh refuses, :class:`AbreastError` if nobody answered.
+    """
+    config = _config(endpoints)
+    deadline = time.monotonic() + patience
+    while True:
+        try:
+            return zenoh.open(config)
+        except zenoh.ZError as error:
+            if endpoints.connect is None or time.monotonic() >= deadline or give_up():
+                reason = str(error).partition(" at /")[0]
+                raise AbreastError(
+                    f"zenoh {endpoints.describe()}: no session ({reason}); "
+                    "is the router up, and is the endpoint right?"
+                ) from None
+        time.sleep(_RETRY_S)
+
+
+def close_session(session: zenoh.Session) -> None:
+    """Close a session, waiting at most two seconds: with the router gone, Zenoh may wait much longer."""
+    closer = threading.Thread(target=session.close, daemon=True)
+    closer.start()
+    closer.join(_CLOSE_S)
+
+
+def free_endpoint() -> str:
+    """A loopback endpoint on a port that is free now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def _config(endpoints: Endpoints) -> zenoh.Config:
+    try:
+        if endpoints.config_file is not None:
+            return zenoh.Config.from_file(str(endpoints.config_file))
+        config = zenoh.Config()
+        config.insert_json5("mode", json.dumps("router" if endpoints.listen else "client"))
+        if endpoints.listen:
+            config.insert_json5("listen/endpoints", json.dumps([endpoints.listen]))
+        if endpoints.connect:
+            config.insert_json5("connect/endpoints", json.dumps([endpoints.connect]))
+        config.insert_json5("scouting/multicast/enabled", "false")
+        config.insert_json5("scouting/gossip/enabled", "false")
+    except zenoh.ZError as error:
+        reason = str(error).partition(" at /")[0]
+        raise UsageError(
+            f"zenoh {endpoints.describe()}: {reason}; give an endpoint like tcp/127.0.0.1:7447"
+        ) from None
+    return config
