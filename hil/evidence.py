@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TypeVar
 
 from hil import topics
@@ -87,7 +88,7 @@ def run_span(evidence: Evidence) -> Span:
 
     For a recording in which no emulated leader sets off: from the first to the last of its captures.
     """
-    captures = [to_ns(message.header.stamp) for message in (*evidence.estimates, *evidence.truth)]
+    captures = _captures(evidence)
     if evidence.motion_since_ns is None:
         return Span(min(captures, default=evidence.zero_ns), max(captures, default=evidence.zero_ns))
     since_ns = evidence.motion_since_ns
@@ -98,7 +99,7 @@ def run_span(evidence: Evidence) -> Span:
 
 
 def evaluation_span(evidence: Evidence) -> Span:
-    """What is judged: what the evidence asks for, else the run from the scenario's ``run.evaluate_from_s`` on.
+    """What is judged: what the evidence asks for, else the run from ``run.evaluate_from_s`` on.
 
     Of a run that does not last that long the second half is judged.
     """
@@ -121,9 +122,7 @@ def evidence_of_log(log: Log, scenario: Scenario | None = None) -> Evidence:
     """
     scenario = scenario or scenario_of(log)
     if scenario is None:
-        raise UsageError(
-            f"log {log.path}: tells no scenario; give one, or a map that names its base scenario"
-        )
+        raise UsageError(f"log {log.path}: does not tell its scenario; give one, or a map that names one")
     names = topics_of(scenario)
     records = _records(log, names)
     counts = _last_counts(_decoded(log, records[topics.DIAGNOSTICS], DiagnosticArray))
@@ -151,8 +150,12 @@ def _zero_ns(log: Log, evidence: Evidence) -> int:
         return evidence.motion_since_ns
     if mode_of(log) == IMPORT:
         return 0
-    stamps = [to_ns(message.header.stamp) for message in (*evidence.estimates, *evidence.truth)]
-    return min(stamps, default=log.start_ns or 0)
+    return min(_captures(evidence), default=log.start_ns or 0)
+
+
+def _captures(evidence: Evidence) -> list[int]:
+    headers = [estimate.header for estimate in evidence.estimates] + [each.header for each in evidence.truth]
+    return [to_ns(header.stamp) for header in headers]
 
 
 def _records(log: Log, names: Topics) -> dict[str, list[Record]]:
@@ -206,16 +209,15 @@ def _frame_counts(
     in a row.
     """
     got = {receipt.digest for estimate in estimates for receipt in estimate.consumed}
-    frames = _decoded(log, [each for each in records if digest(each.topic, each.payload) in got], RigidBodies)
+    taken_in = [record for record in records if digest(record.topic, record.payload) in got]
+    found = {frame.frame_number for frame in _decoded(log, taken_in, RigidBodies)}
     captured = {each.frame_number for each in truth}
-    numbers = sorted(
-        {frame.frame_number for frame in frames} & (captured or {f.frame_number for f in frames})
-    )
+    numbers = sorted(found & captured if captured else found)
     if len(numbers) < 2:
         return None
     if captured:
         published = sum(numbers[0] <= number <= numbers[-1] for number in captured)
     else:
-        steps = Counter(after - before for before, after in zip(numbers, numbers[1:], strict=False))
+        steps = Counter(after - before for before, after in pairwise(numbers))
         published = round((numbers[-1] - numbers[0]) / steps.most_common(1)[0][0]) + 1
     return FrameCounts(published, len(numbers))
