@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from estimation.bounds import InputErrors, Perceived, RateErrors, extended_alpha1, extended_h, extended_v1
+from estimation.bounds import InputErrors, Perceived, RateErrors, extended_bounds
 from estimation.estimate import Estimate
 from estimation.guarantees import guaranteed_rate, leader_acceleration
 from estimation.tracking import Status
@@ -89,6 +89,7 @@ def to_message(
     """Message of an estimate made at ``now_ns``, with its extended bounds."""
     seen = perceived(estimate)
     rates, inputs = assumed.at(max(estimate.rho, 1e-6))
+    bounds = extended_bounds(seen, rates, inputs, assumed.v_eps, assumed.mu1, assumed.spacing)
     return LeaderEstimate(
         header=header(estimate.capture_ns, frame_id),
         measured=to_time(estimate.measured_ns),
@@ -106,9 +107,9 @@ def to_message(
         nis=estimate.nis,
         status=int(estimate.status),
         reason=reason,
-        bound_v1=float(extended_v1(seen, rates, inputs)),
-        bound_alpha1=float(extended_alpha1(seen, rates, inputs, assumed.v_eps)),
-        bound_h=float(extended_h(seen, rates, inputs, assumed.v_eps, assumed.mu1, assumed.spacing)),
+        bound_v1=float(bounds[0]),
+        bound_alpha1=float(bounds[1]),
+        bound_h=float(bounds[2]),
         consumed=receipts,
     )
 
