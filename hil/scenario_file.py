@@ -45,7 +45,7 @@ def build_scenario(
 
 
 def merged_scenario(part: Mapping[str, Any], name: str, source: str) -> Scenario:
-    """Scenario from a part of one: its ``base`` (a scenario's name or path), with the part's keys put over it.
+    """Scenario from its ``base`` (a scenario's name or path) with the other keys of ``part`` put over it.
 
     The result is called ``name`` unless the part names itself. Raises :class:`UsageError` as
     :func:`load_scenario` does, beginning with ``source``.
