@@ -178,35 +178,6 @@ def extended_h(
     * v1_hat f(rho_hat) rho_hat/rho - v1 f(rho) = (v1_hat - v1) f(rho) + v1_hat (f(rho_hat) - f(rho))
       + v1_hat f(rho_hat) (rho_hat/rho - 1), where f is largest and changes most at lo or hi because it grows.
     """
-    velocity_error = extended_v1(perceived, rates, inputs)
-    alpha1_error = _subtended(velocity_error, perceived.v1, v_eps)
-    return _extended_h(perceived, rates, inputs, velocity_error, alpha1_error, mu1, spacing)
-
-
-def extended_bounds(
-    perceived: Perceived,
-    rates: RateErrors,
-    inputs: InputErrors,
-    v_eps: Values,
-    mu1: float,
-    spacing: Spacing,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The extended bounds of v1, alpha1 and h together, at less cost than one by one."""
-    velocity_error = extended_v1(perceived, rates, inputs)
-    alpha1_error = _subtended(velocity_error, perceived.v1, v_eps)
-    h_error = _extended_h(perceived, rates, inputs, velocity_error, alpha1_error, mu1, spacing)
-    return velocity_error, alpha1_error, h_error
-
-
-def _extended_h(
-    perceived: Perceived,
-    rates: RateErrors,
-    inputs: InputErrors,
-    velocity_error: FloatArray,
-    alpha1_error: FloatArray,
-    mu1: float,
-    spacing: Spacing,
-) -> FloatArray:
     rho = np.asarray(perceived.rho)
     known = rho > inputs.E_rho
     lo = np.where(known, rho - inputs.E_rho, rho)
@@ -215,11 +186,12 @@ def _extended_h(
 
     turn = np.abs(np.asarray(perceived.alpha2_dot) + perceived.u2)
     line = rates.M_alpha2 + inputs.E_u2 + stretch * turn + _sideways_error(perceived, inputs) / lo
-    change = cosine_change(perceived.alpha1, alpha1_error)
+    change = cosine_change(perceived.alpha1, extended_alpha1(perceived, rates, inputs, v_eps))
     bearing = mu1 * (change + stretch * np.abs(np.cos(perceived.alpha1)))
     largest_f = np.maximum(np.abs(f_lo), np.abs(f_hi))
     f_change = np.maximum(f_hat - f_lo, f_hi - f_hat)
-    distance = velocity_error * largest_f + perceived.v1 * (f_change + stretch * np.abs(f_hat))
+    distance = extended_v1(perceived, rates, inputs) * largest_f
+    distance = distance + perceived.v1 * (f_change + stretch * np.abs(f_hat))
     return np.where(known, line + bearing + distance, math.inf)
 
 
@@ -229,7 +201,7 @@ def cosine_change(angle: Values, span: Values) -> FloatArray:
     Fold the angle to [0, pi]. There the cosine falls, and so its extremes lie at the ends of the span, cut
     off at 0 and pi. The product form keeps its digits when the span is tiny.
     """
-    folded = np.abs(wrap(float(angle) if np.ndim(angle) == 0 else np.asarray(angle)))
+    folded = np.abs(wrap(np.asarray(angle)))
     near, far = np.maximum(folded - span, 0.0), np.minimum(folded + span, math.pi)
     rise = 2.0 * np.sin(0.5 * (folded + near)) * np.sin(0.5 * (folded - near))
     fall = 2.0 * np.sin(0.5 * (far + folded)) * np.sin(0.5 * (far - folded))
@@ -268,8 +240,5 @@ def _sideways_error(perceived: Perceived, inputs: InputErrors) -> FloatArray:
 
 def _require_magnitudes(**bounds: Values) -> None:
     for name, value in bounds.items():
-        if isinstance(value, float):
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{name} is {value}, expected a finite number >= 0")
-        elif not np.all(np.isfinite(value) & (np.asarray(value) >= 0.0)):
+        if not np.all(np.isfinite(value) & (np.asarray(value) >= 0.0)):
             raise ValueError(f"{name} is {value}, expected finite numbers >= 0")

@@ -6,9 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from estimation.bounds import InputErrors, Perceived, RateErrors, extended_bounds
+from estimation.bounds import InputErrors, Perceived, RateErrors
 from estimation.estimate import Estimate
 from estimation.guarantees import guaranteed_rate, leader_acceleration
+from estimation.live_bounds import ErrorBounds, LawConstants, live_bounds
 from estimation.tracking import Status
 from formation.spacing import Spacing
 from hil.message_types import Consumed, LeaderEstimate
@@ -31,9 +32,7 @@ class AssumedErrors:
     bearing_grows: bool
     E_v2: float
     E_u2: float
-    v_eps: float
-    mu1: float
-    spacing: Spacing
+    law: LawConstants
 
     @staticmethod
     def of(scenario: Scenario) -> AssumedErrors:
@@ -50,18 +49,32 @@ class AssumedErrors:
             bearing_grows=mocap,
             E_v2=_SIGMAS * given.sigma_v2,
             E_u2=_SIGMAS * given.sigma_u2,
-            v_eps=leader.v_eps,
-            mu1=scenario.controller.mu1,
-            spacing=Spacing(scenario.formation.rho_0, scenario.controller.mu_rho),
+            law=LawConstants(
+                leader.v_eps,
+                scenario.controller.mu1,
+                Spacing(scenario.formation.rho_0, scenario.controller.mu_rho),
+            ),
         )
 
-    def at(self, rho: float) -> tuple[RateErrors, InputErrors]:
-        """Bounds on the errors of the rates and of the inputs at a distance rho [m] > 0."""
+    def errors(self, rho: float) -> ErrorBounds:
+        """Bounds on the errors of rates and inputs at a distance rho [m] > 0."""
         sd_bearing = (
             math.hypot(self.sd_range / rho, self.sd_bearing) if self.bearing_grows else self.sd_bearing
         )
-        rates = RateErrors(self.rate + self.E_v2, self.rate / rho + self.E_u2)
-        return rates, InputErrors(_SIGMAS * self.sd_range, _SIGMAS * sd_bearing, self.E_v2, self.E_u2)
+        return ErrorBounds(
+            M_rho=self.rate + self.E_v2,
+            M_alpha2=self.rate / rho + self.E_u2,
+            E_rho=_SIGMAS * self.sd_range,
+            E_alpha2=_SIGMAS * sd_bearing,
+            E_v2=self.E_v2,
+            E_u2=self.E_u2,
+        )
+
+    def at(self, rho: float) -> tuple[RateErrors, InputErrors]:
+        """The same as :meth:`errors`, for the bounds on arrays."""
+        errors = self.errors(rho)
+        inputs = InputErrors(errors.E_rho, errors.E_alpha2, errors.E_v2, errors.E_u2)
+        return RateErrors(errors.M_rho, errors.M_alpha2), inputs
 
 
 def perceived(estimate: Estimate) -> Perceived:
@@ -87,9 +100,14 @@ def to_message(
     receipts: Sequence[Consumed],
 ) -> LeaderEstimate:
     """Message of an estimate made at ``now_ns``, with its extended bounds."""
-    seen = perceived(estimate)
-    rates, inputs = assumed.at(max(estimate.rho, 1e-6))
-    bounds = extended_bounds(seen, rates, inputs, assumed.v_eps, assumed.mu1, assumed.spacing)
+    bound_v1, bound_alpha1, bound_h = live_bounds(
+        (estimate.rho, estimate.alpha2),
+        (estimate.v1, estimate.alpha1),
+        (estimate.v2, estimate.u2),
+        estimate.alpha2_dot,
+        assumed.errors(max(estimate.rho, 1e-6)),
+        assumed.law,
+    )
     return LeaderEstimate(
         header=header(estimate.capture_ns, frame_id),
         measured=to_time(estimate.measured_ns),
@@ -107,9 +125,9 @@ def to_message(
         nis=estimate.nis,
         status=int(estimate.status),
         reason=reason,
-        bound_v1=float(bounds[0]),
-        bound_alpha1=float(bounds[1]),
-        bound_h=float(bounds[2]),
+        bound_v1=bound_v1,
+        bound_alpha1=bound_alpha1,
+        bound_h=bound_h,
         consumed=receipts,
     )
 
