@@ -24,11 +24,19 @@ M = TypeVar("M", bound=Message)
 
 
 @dataclass(frozen=True, slots=True)
-class FrameCounts:
-    """Frames that were captured from the first to the last that the estimator got, and how many it got."""
+class Frames:
+    """Motion-capture frames: when those that the estimator got were captured [ns], each once, in order.
+
+    ``published``: how many were captured from the first to the last of them.
+    """
 
     published: int
-    received: int
+    captures_ns: Sequence[int]
+
+    @property
+    def received(self) -> int:
+        """How many the estimator got."""
+        return len(self.captures_ns)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +74,7 @@ class Evidence:
     stopped_ns: int | None = None
     evaluate_from_ns: int | None = None
     evaluate_to_ns: int | None = None
-    frames: FrameCounts | None = None
+    frames: Frames | None = None
     log: LogFacts | None = None
 
 
@@ -139,7 +147,7 @@ def evidence_of_log(log: Log, scenario: Scenario | None = None) -> Evidence:
         refused=_group(counts.get("estimator", {}), "refused"),
         motion_since_ns=None if since is None else int(since),
         stopped_ns=records[topics.STOP][0].log_ns if records[topics.STOP] else None,
-        frames=_frame_counts(log, records[topics.RIGID_BODIES], estimates, truth),
+        frames=_frames(log, records[topics.RIGID_BODIES], estimates, truth),
         log=LogFacts(str(log.path), log.messages, log.path.stat().st_size),
     )
     return replace(evidence, zero_ns=_zero_ns(log, evidence))
@@ -199,10 +207,10 @@ def _group(values: Mapping[str, str], group: str) -> dict[str, int]:
     return {key.removeprefix(prefix): int(text) for key, text in values.items() if key.startswith(prefix)}
 
 
-def _frame_counts(
+def _frames(
     log: Log, records: Sequence[Record], estimates: Sequence[LeaderEstimate], truth: Sequence[Truth]
-) -> FrameCounts | None:
-    """Count frames by their numbers, so that one that came twice counts once.
+) -> Frames | None:
+    """Frames by their numbers, so that one that came twice counts once; None for fewer than two.
 
     The estimator got those that its estimates have receipts for. What was captured is known from the truth of
     an emulated run; elsewhere from the numbers themselves, whose commonest step is taken for that of frames
@@ -210,9 +218,13 @@ def _frame_counts(
     """
     got = {receipt.digest for estimate in estimates for receipt in estimate.consumed}
     taken_in = [record for record in records if digest(record.topic, record.payload) in got]
-    found = {frame.frame_number for frame in _decoded(log, taken_in, RigidBodies)}
     captured = {each.frame_number for each in truth}
-    numbers = sorted(found & captured if captured else found)
+    found = {
+        frame.frame_number: to_ns(frame.header.stamp)
+        for frame in _decoded(log, taken_in, RigidBodies)
+        if not captured or frame.frame_number in captured
+    }
+    numbers = sorted(found)
     if len(numbers) < 2:
         return None
     if captured:
@@ -220,4 +232,4 @@ def _frame_counts(
     else:
         steps = Counter(after - before for before, after in pairwise(numbers))
         published = round((numbers[-1] - numbers[0]) / steps.most_common(1)[0][0]) + 1
-    return FrameCounts(published, len(numbers))
+    return Frames(published, sorted(found.values()))
