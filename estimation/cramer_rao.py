@@ -86,7 +86,12 @@ def state_bound(path: TruePath, model: Model, sigma_position: float) -> NDArray[
 
 
 def cramer_rao(
-    path: TruePath, model: Model, pose_noise: PoseNoise, sd_v2: float, sd_u2: float
+    path: TruePath,
+    model: Model,
+    pose_noise: PoseNoise,
+    sd_v2: float,
+    sd_u2: float,
+    wanted: NDArray[np.bool_] | None = None,
 ) -> dict[str, Vector]:
     """Least standard deviation, each (n,), of :data:`estimation.estimate.QUANTITIES` over the path.
 
@@ -94,11 +99,13 @@ def cramer_rao(
     (sd_v2 [m/s], sd_u2 [rad/s]), alpha1 [rad] that of its position: the bound is for estimators that take the
     follower's pose and motion as measured at that moment, unfiltered. Angles are mapped to first order, so
     that a bound of more than about 0.5 rad only says that nothing is known yet. For the RMS over many paths,
-    average the squares. Infinite before the first measurement.
+    average the squares. Infinite before the first measurement, and in rows that are not ``wanted`` (None: all
+    are), for which the mapping is left out.
     """
     states = state_bound(path, model, pose_noise.position)
     deviations = np.full((len(states), len(QUANTITIES)), math.inf)
-    for k in np.flatnonzero(np.isfinite(states[:, 0, 0])):
+    known = np.isfinite(states[:, 0, 0])
+    for k in np.flatnonzero(known if wanted is None else known & wanted):
         mean = path.leader[k]
         v2, u2 = path.follower_motion[k].tolist()
         here = Measurement(
