@@ -96,7 +96,7 @@ class CommandColumns:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
-    """Evidence as columns. ``samples``: the estimates that are judged; ``true``: the truth at each of them."""
+    """Evidence as columns. ``samples``: the estimates that are judged; ``true``: the truth at each."""
 
     run: Span
     span: Span

@@ -15,8 +15,12 @@ from hil.evidence_columns import Columns, EstimateColumns
 from hil.scenario import Scenario
 
 
+_ERRORS = ("M_rho", "M_alpha2", "E_rho", "E_alpha2", "E_v2", "E_u2")
+_NEAREST = 1e-6  # m; nobody is nearer, and bounds divide by the distance
+
+
 @dataclass(frozen=True, slots=True)
-class ErrorBounds:
+class WorstErrors:
     """What the bounds rest on, for all samples."""
 
     rates: RateErrors
@@ -55,7 +59,7 @@ def judge_bounds(scenario: Scenario, columns: Columns) -> dict[str, object]:
     return result | {"violations": verdict.violations, "tightness": verdict.tightness}
 
 
-def named_bounds(scenario: Scenario, columns: Columns, given: ErrorBounds) -> dict[str, FloatArray]:
+def named_bounds(scenario: Scenario, columns: Columns, given: WorstErrors) -> dict[str, FloatArray]:
     """Every named bound at every sample."""
     spacing = Spacing(scenario.formation.rho_0, scenario.controller.mu_rho)
     bounds = all_bounds(
@@ -70,7 +74,7 @@ def named_bounds(scenario: Scenario, columns: Columns, given: ErrorBounds) -> di
     return {name: np.broadcast_to(bound, (n,)) for name, bound in bounds.items()}
 
 
-def error_bounds(scenario: Scenario, columns: Columns) -> ErrorBounds:
+def error_bounds(scenario: Scenario, columns: Columns) -> WorstErrors:
     """Bounds of rate and input errors: of a quantity whose truth is known, the samples' largest error.
 
     Of any other, the error that the scenario's noise lets assume at each sample's distance.
@@ -89,17 +93,13 @@ def error_bounds(scenario: Scenario, columns: Columns) -> ErrorBounds:
     }
     if len(largest) < len(errors):
         largest = _assumed(scenario, columns.samples) | largest
-    return ErrorBounds(
+    return WorstErrors(
         RateErrors(largest["M_rho"], largest["M_alpha2"]),
         InputErrors(largest["E_rho"], largest["E_alpha2"], largest["E_v2"], largest["E_u2"]),
     )
 
 
 def _assumed(scenario: Scenario, samples: EstimateColumns) -> dict[str, Values]:
-    errors = AssumedErrors.of(scenario)
-    rows = []
-    for rho in np.asarray(samples.seen.rho).tolist():
-        rates, inputs = errors.at(max(rho, 1e-6))
-        rows.append((rates.M_rho, rates.M_alpha2, inputs.E_rho, inputs.E_alpha2, inputs.E_v2, inputs.E_u2))
-    names = ("M_rho", "M_alpha2", "E_rho", "E_alpha2", "E_v2", "E_u2")
-    return dict(zip(names, np.array(rows, dtype=np.float64).T, strict=True))
+    assumed = AssumedErrors.of(scenario)
+    at_each = [assumed.errors(max(rho, _NEAREST)) for rho in np.asarray(samples.seen.rho).tolist()]
+    return {name: np.array([getattr(errors, name) for errors in at_each]) for name in _ERRORS}

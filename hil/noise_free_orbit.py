@@ -12,9 +12,9 @@ from formation.angles import FloatArray, wrap
 from formation.pose import Motion
 from formation.shape import Shape, shape_rates
 from hil.evidence import Span
-from hil.true_states import Stamps, TrueStates
 from hil.scenario import Scenario
 from hil.scenario_parts import gains, limits
+from hil.true_states import Stamps, TrueStates
 
 STEP = 1.0 / 30.0
 """Step of the integration [s]; the error of a step of fourth order at the rates of these laws is < 1e-6."""

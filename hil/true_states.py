@@ -99,6 +99,6 @@ def _shape_and_rates(told: list[float]) -> tuple[float, float, float, float, flo
     try:
         shape = shape_of(Pose(lx, ly, ltheta), Pose(fx, fy, ftheta))
     except ValueError:  # both in one place: there is no shape
-        return (math.nan,) * _SHAPE_SIZE
+        return math.nan, math.nan, math.nan, math.nan, math.nan
     rates = shape_rates(shape, Motion(v1, u1), Motion(v2, u2))
     return shape.rho, shape.alpha1, shape.alpha2, rates.rho_dot, rates.alpha2_dot
