@@ -41,6 +41,7 @@ def command(
     law: str | None,
     out: Path | None,
     lockstep: bool,
+    listen: str | None,
     overrides: tuple[str, ...],
     as_json: bool,
 ) -> None:
@@ -52,7 +53,9 @@ def command(
     log_path = folder / "run.mcap"
     if log_path.exists():
         raise UsageError(f"{log_path} exists already; give another --out, or move it away")
-    failure = _lockstep(chosen, log_path) if lockstep else _live(chosen, folder, log_path)
+    failure = _lockstep(chosen, log_path) if lockstep else _live(chosen, folder, log_path, listen)
+    if failure:
+        _make_whole(log_path)
     summary = _judge(log_path, folder)
     if as_json:
         print_json(summary)
@@ -85,13 +88,14 @@ def _lockstep(scenario: Scenario, log_path: Path) -> str:
     return ""
 
 
-def _live(scenario: Scenario, folder: Path, log_path: Path) -> str:
+def _live(scenario: Scenario, folder: Path, log_path: Path, listen: str | None) -> str:
     from rich.console import Console
 
     from hil.controller_node import ControllerNode
     from hil.live_daemon import Ending
     from hil.live_run import run_live
     from hil.live_watch import Picture
+    from hil.session import free_endpoint
 
     ControllerNode(scenario)  # a law that cannot run is better refused here than by a daemon
     ending = Ending()
@@ -103,10 +107,26 @@ def _live(scenario: Scenario, folder: Path, log_path: Path) -> str:
             if elapsed is not None:
                 status.update(picture.line(elapsed, scenario.run.duration_s))
 
-        outcome = run_live(scenario, folder, log_path, ending, show)
+        outcome = run_live(scenario, folder, log_path, listen or free_endpoint(), ending, show)
     if outcome.interrupted:
         console.print(f"interrupted after {outcome.duration_s:.1f} s; the robots stand, the log is whole")
     return outcome.failure
+
+
+def _make_whole(log_path: Path) -> None:
+    """Recover the log if the recorder was cut off; what it left stays beside it as ``run.cut.mcap``."""
+    from hil.log_reader import read_log
+    from hil.log_recovery import recover
+
+    try:
+        read_log(log_path)
+    except UsageError:
+        cut = log_path.with_suffix(".cut.mcap")
+        log_path.rename(cut)
+        recover(cut, log_path)
+        click.echo(
+            f"the log was cut off; {log_path} is what could be recovered, {cut} what there was", err=True
+        )
 
 
 def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
