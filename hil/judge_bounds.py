@@ -14,7 +14,6 @@ from hil.estimate_message import AssumedErrors
 from hil.evidence_columns import Columns, EstimateColumns
 from hil.scenario import Scenario
 
-
 _ERRORS = ("M_rho", "M_alpha2", "E_rho", "E_alpha2", "E_v2", "E_u2")
 _NEAREST = 1e-6  # m; nobody is nearer, and bounds divide by the distance
 
