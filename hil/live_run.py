@@ -15,7 +15,7 @@ from hil.live_watch import Picture, Watch
 from hil.messages import encode, header
 from hil.scenario import Scenario
 from hil.scenario_file import scenario_text
-from hil.session import Endpoints, close_session, free_endpoint, open_session
+from hil.session import Endpoints, close_session, open_session
 from hil.topics import topics_of
 from hil.wire import Wire
 
@@ -37,13 +37,15 @@ class Outcome:
     duration_s: float
 
 
-def run_live(scenario: Scenario, folder: Path, log_path: Path, ending: Ending, show: Show) -> Outcome:
+def run_live(
+    scenario: Scenario, folder: Path, log_path: Path, endpoint: str, ending: Ending, show: Show
+) -> Outcome:
     """Run a scenario live for its duration, or until the end is asked for, or until a daemon fails.
 
+    The router listens on ``endpoint``, where others may connect too.
     ``show`` gets the picture of the run and the time since the leader set off (None before), some 20 times a
     second. However it ends, the robots are stopped, the log is finished and no process is left.
     """
-    endpoint = free_endpoint()
     router = open_session(Endpoints(listen=endpoint))
     supervisor = _Supervisor(scenario, folder, log_path, endpoint)
     try:

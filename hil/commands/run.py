@@ -29,6 +29,7 @@ DURATION = click.FloatRange(min=0, min_open=True)
 @click.option(
     "--lockstep", is_flag=True, help="On a simulated clock, as fast as it goes; same seed, same bytes."
 )
+@click.option("--listen", metavar="ENDPOINT", help="Where the router listens [a free port on loopback].")
 @click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override any key of the scenario."
 )
