@@ -13,12 +13,11 @@ from hil import topics
 from hil.column_map import ColumnMap
 from hil.csv_table import Row, read_rows
 from hil.emulated_wire import frame_message, odometry_message
+from hil.evidence import IMPORT
 from hil.log_metadata import log_metadata
 from hil.log_writer import LogWriter
 from hil.messages import encode, header, typename_of
 from hil.topics import Topics, topics_of
-
-MODE = "import"
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +38,7 @@ def import_csv(recording: Path, chart: ColumnMap, out: Path) -> Imported:
     """
     rows = read_rows(recording, chart)
     names = topics_of(chart.scenario)
-    metadata = log_metadata(chart.scenario, MODE)
+    metadata = log_metadata(chart.scenario, IMPORT)
     metadata["source"] = {"file": recording.name, "map": chart.path.name}
     with LogWriter(out, metadata) as log:
         try:

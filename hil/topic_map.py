@@ -7,6 +7,7 @@ A map is a TOML file. ``[topics]`` names the topics, either ``rigid_bodies`` or 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -17,7 +18,7 @@ from msgspec import Struct
 from hil.checked_toml import checked, locate, read_toml
 from hil.errors import UsageError
 from hil.scenario import NonNegative, Scenario
-from hil.scenario_file import merged_scenario
+from hil.scenario_file import merged_scenario, with_overrides
 
 MAPS = "maps"
 
@@ -63,8 +64,16 @@ class TopicMap:
     scenario: Scenario
 
 
-def load_topic_map(name_or_path: str, leader: str | None = None, follower: str | None = None) -> TopicMap:
-    """Read a topic map by path; ``leader``, ``follower`` take the place of the body names it gives.
+def load_topic_map(
+    name_or_path: str,
+    leader: str | None = None,
+    follower: str | None = None,
+    overrides: Iterable[str] = (),
+) -> TopicMap:
+    """Read a topic map by path.
+
+    ``leader``, ``follower`` take the place of the body names it gives; ``overrides`` change its scenario as
+    ``section.key=value``.
 
     Raises :class:`UsageError` for a file that isn't there or not TOML, an unknown key (naming the nearest
     known one), a wrong value, or topics that don't make up a measurement.
@@ -77,7 +86,7 @@ def load_topic_map(name_or_path: str, leader: str | None = None, follower: str |
         raise UsageError(f"{source}: topics: give rigid_bodies, or both of leader_pose and follower_pose")
     if file.topics.rigid_bodies is not None and poses != (None, None):
         raise UsageError(f"{source}: topics: give either rigid_bodies or leader_pose and follower_pose")
-    scenario = merged_scenario(file.scenario, path.stem, f"{source}: scenario")
+    scenario = with_overrides(merged_scenario(file.scenario, path.stem, f"{source}: scenario"), overrides)
     return TopicMap(
         path=path,
         topics=_without_slashes(file.topics),

@@ -1,0 +1,33 @@
+"""``abreast import``: other recordings turned into logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.group("import")
+def command() -> None:
+    """Turn a recording that is not a log into one, for replay."""
+
+
+@command.command("csv")
+@click.argument("recording", type=click.Path(path_type=Path))
+@click.option(
+    "--map", "chart", required=True, metavar="FILE", help="Column map: a TOML file or a shipped name."
+)
+@click.option(
+    "--out", required=True, type=click.Path(path_type=Path), metavar="LOG", help="The log to write."
+)
+def import_table(recording: Path, chart: str, out: Path) -> None:
+    """Turn the CSV file RECORDING into a log by a map of its columns."""
+    from hil.column_map import load_column_map
+    from hil.csv_import import import_csv
+
+    done = import_csv(recording, load_column_map(chart), out)
+    click.echo(
+        f"{out}: {done.rows} rows from {done.from_s:g} s to {done.to_s:g} s; "
+        f"go on with: abreast replay {out}",
+        err=True,
+    )

@@ -1,0 +1,127 @@
+"""``abreast replay``: a log through the same steps again, verified, re-estimated, judged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hil.errors import CheckFailedError, UsageError
+from hil.report_json import print_json, write_json
+
+if TYPE_CHECKING:
+    from hil.evidence import Evidence
+    from hil.log_reader import Log
+    from hil.replay import Replay
+
+
+@click.command("replay")
+@click.argument("log", type=click.Path(path_type=Path))
+@click.option("--verify", is_flag=True, help="Compare with what was recorded, bit for bit.")
+@click.option("--estimator", metavar="E", help="Estimator in place of the log's: ekf, ukf or difference.")
+@click.option("--leader", metavar="NAME", help="Name of the leader's body.")
+@click.option("--follower", metavar="NAME", help="Name of the follower's body.")
+@click.option("--map", "chart", metavar="FILE", help="Names the topics of a log that is not abreast's.")
+@click.option("--from", "from_s", type=float, metavar="S", help="Judge from here on.")
+@click.option("--to", "to_s", type=float, metavar="S", help="Judge up to here.")
+@click.option("--csv", "table", type=click.Path(path_type=Path), metavar="FILE", help="Write the estimates.")
+@click.option(
+    "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Folder for results."
+)
+@click.option("--strict", is_flag=True, help="Fail if an error lies outside its extended bound.")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object on stdout.")
+def command(
+    log: Path,
+    verify: bool,
+    estimator: str | None,
+    leader: str | None,
+    follower: str | None,
+    chart: str | None,
+    from_s: float | None,
+    to_s: float | None,
+    table: Path | None,
+    out: Path | None,
+    strict: bool,
+    as_json: bool,
+) -> None:
+    """Run LOG through the very steps that run live, and judge what comes out.
+
+    --from and --to are seconds since the leader set off, for imported recordings the source's own time; the
+    steps always begin where the log does.
+    """
+    from hil.judge import summarise
+    from hil.log_reader import read_log
+    from hil.replay_verdict import evidence_of_replay, parity_json, violated_bounds, why_not_same
+    from hil.run_summary_text import print_summary
+
+    if from_s is not None and to_s is not None and to_s <= from_s:
+        raise UsageError(f"--to {to_s:g}: expected more than --from {from_s:g}")
+    given = read_log(log)
+    played = _played(given, chart, estimator, leader, follower, verify=verify)
+    evidence = evidence_of_replay(given, played, from_s, to_s)
+    summary = summarise(evidence)
+    if verify:
+        summary["parity"] = parity_json(played)
+    _write(evidence, summary, table, out)
+    print_summary(summary)
+    if as_json:
+        print_json(summary)
+    if verify and (reason := why_not_same(given, played)):
+        raise CheckFailedError(reason)
+    if strict and (broken := violated_bounds(summary)):
+        counts = ", ".join(f"{name} by {count}" for name, count in broken.items())
+        raise CheckFailedError(f"log {log}: extended bounds violated (samples): {counts}")
+
+
+def _played(
+    log: Log,
+    chart: str | None,
+    estimator: str | None,
+    leader: str | None,
+    follower: str | None,
+    *,
+    verify: bool,
+) -> Replay:
+    """Replay of one of our logs, or of another lab's by its topic map."""
+    from hil.log_metadata import scenario_of
+    from hil.replay import replay, replay_foreign
+    from hil.scenario_file import with_overrides
+    from hil.topic_map import load_topic_map
+
+    kind = [] if estimator is None else [f"estimator.kind={estimator}"]
+    if chart is not None:
+        if verify:
+            raise UsageError("--verify: a log that needs --map has no estimates of ours; leave one out")
+        return replay_foreign(log, load_topic_map(chart, leader, follower, kind))
+    own = scenario_of(log)
+    if own is None:
+        return replay(log)
+    names = {"leader.name": leader, "follower.name": follower}
+    renamed = [f"{key}={name}" for key, name in names.items() if name is not None]
+    chosen = with_overrides(own, [*kind, *renamed])
+    if verify and chosen != own:
+        raise UsageError(
+            f"--verify compares with what was recorded: by {own.estimator.kind}, of leader "
+            f"{own.leader.name!r} and follower {own.follower.name!r}; leave out what changes that"
+        )
+    return replay(log, chosen)
+
+
+def _write(evidence: Evidence, summary: dict[str, Any], table: Path | None, out: Path | None) -> None:
+    from hil.estimate_csv import write_estimates
+    from hil.replay_verdict import evaluated
+
+    if table is not None:
+        write_estimates(evaluated(evidence), table)
+    if out is None:
+        return
+    from hil.run_figures import draw_run
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"--out {out}: cannot be made ({error.strerror}); give another folder") from None
+    write_json(summary, out / "summary.json")
+    write_estimates(evaluated(evidence), out / "estimates.csv")
+    draw_run(evidence, summary, out / "replay.png")
