@@ -15,7 +15,6 @@ from estimation.tracking import Status
 from formation.pose import Motion
 from hil import message_types as msg
 from hil import topics
-from hil.errors import UsageError
 from hil.estimate_message import from_message
 from hil.messages import MalformedPayloadError, decode_as, header, to_time
 from hil.node import (
@@ -32,6 +31,7 @@ from hil.node import (
 from hil.scenario import Scenario
 from hil.scenario_parts import gains, limits
 from hil.topics import topics_of
+from hil.twist_wire import drive_message, read_drive
 
 NAME = "controller"
 _DIAGNOSTICS_NS = 500_000_000
@@ -42,7 +42,8 @@ class ControllerState(Struct, frozen=True):
     """All that the controller remembers.
 
     ``estimate``: the newest one that may move the robot; ``status``: of the newest one of any kind.
-    ``sent``: commands since that estimate's capture, oldest first, and the one before.
+    ``sent``: commands since that estimate's capture, oldest first, and the one before. ``leader_u1``: the
+    turn rate that the leader was told to drive, kept for the law ``ideal``, nan before it is known.
     """
 
     estimate: Estimate | None = None
@@ -53,6 +54,7 @@ class ControllerState(Struct, frozen=True):
     refused: Counts = field(default_factory=no_counts)
     decided: Counts = field(default_factory=no_counts)
     heard: bool = False
+    leader_u1: float = math.nan
     next_tick_ns: int = 0
     next_diagnostics_ns: int = 0
 
@@ -64,11 +66,6 @@ class ControllerNode:
 
     def __init__(self, scenario: Scenario) -> None:
         given = scenario.controller
-        if given.law == "ideal":
-            raise UsageError(
-                "law 'ideal' needs the leader's turn rate, which a follower cannot see; "
-                "use --law independent here, or `abreast simulate` for the ideal law"
-            )
         self.topics = topics_of(scenario)
         self.law = LAWS[given.law]
         self.gains, self.limits = gains(scenario), limits(scenario)
@@ -77,7 +74,9 @@ class ControllerNode:
         self.transport_ns = round(given.transport_s / _NS)
         self.ahead_ns = self.transport_ns + round(given.lag_s / _NS)
         self.tick_ns = round(1.0 / given.tick_hz / _NS)
-        self.subscribes: tuple[str, ...] = (self.topics.estimate, topics.STOP)
+        self.needs_u1 = given.law == "ideal"
+        leader = (self.topics.leader_cmd_vel,) if self.needs_u1 else ()
+        self.subscribes: tuple[str, ...] = (self.topics.estimate, topics.STOP, *leader)
 
     def begin(self, now_ns: int) -> ControllerState:
         """State of a controller that has heard nothing: it keeps the robot still."""
@@ -104,10 +103,19 @@ class ControllerNode:
             fresh = estimate.status is Status.TRACKING
             kept = estimate if fresh else state.estimate
             state = replace(state, status=estimate.status, heard=True, estimate=kept)
+        elif event.topic == self.topics.leader_cmd_vel:
+            return self._hear_leader(state, event.payload), ()
         elif event.topic:
             return state, ()
         state, out = self._command(state, now_ns, fresh=fresh)
         return self._speak(state, out, now_ns)
+
+    def _hear_leader(self, state: ControllerState, payload: bytes) -> ControllerState:
+        try:
+            told = read_drive(payload, stamped=self.topics.stamped)
+        except MalformedPayloadError:
+            return replace(state, refused=counted(state.refused, "malformed"))
+        return replace(state, leader_u1=told.u)
 
     def _command(
         self, state: ControllerState, now_ns: int, *, fresh: bool
@@ -130,9 +138,10 @@ class ControllerNode:
         age: float | None = None
         if estimate is not None:
             age = (now_ns - estimate.measured_ns) * _NS
+            u1 = state.leader_u1 if self.needs_u1 else estimate.u1
             if age <= self.max_age:
                 shape = predict_shape(estimate, state.sent, now_ns + self.ahead_ns, self.lag)
-                wanted = self.law(shape, estimate.v1, estimate.u1, self.gains, self.limits)
+                wanted = self.law(shape, estimate.v1, u1, self.gains, self.limits)
             else:
                 wanted = Motion(math.nan, math.nan)
         return decide(
@@ -155,13 +164,7 @@ class ControllerNode:
         fresh: bool,
     ) -> tuple[Outgoing, ...]:
         estimate, wanted = state.estimate, decision.wanted
-        twist = msg.Twist(
-            linear=msg.Vector3(x=decision.sent.v, y=0.0, z=0.0),
-            angular=msg.Vector3(x=0.0, y=0.0, z=decision.sent.u),
-        )
-        drive: msg.Message = twist
-        if self.topics.stamped:
-            drive = msg.TwistStamped(header=header(now_ns, self.topics.follower), twist=twist)
+        drive = drive_message(decision.sent, now_ns, self.topics.follower, stamped=self.topics.stamped)
         record = msg.Command(
             header=header(now_ns, self.topics.follower),
             capture=to_time(estimate.capture_ns if estimate else 0),

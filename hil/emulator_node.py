@@ -18,11 +18,12 @@ from hil import topics
 from hil.emulated_mocap import Delivery, MocapNoise, Stream, draw_frame, normals, observe
 from hil.emulated_robot import Actuators, Robot, drive
 from hil.emulated_wire import frame_message, odometry_message, truth_message
-from hil.messages import MalformedPayloadError, decode, decode_as
+from hil.messages import MalformedPayloadError, decode_as
 from hil.node import Counts, Event, Outgoing, counted, diagnostics, named_counts, no_counts, outgoing
 from hil.scenario import Scenario
 from hil.scenario_parts import leader_program, start_poses
 from hil.topics import topics_of
+from hil.twist_wire import drive_message, read_drive
 
 NAME = "emulator"
 _NS = 1e-9
@@ -102,11 +103,7 @@ class EmulatorNode:
             return replace(state, refused=counted(state.refused, "malformed")), out
 
     def _on_command(self, state: EmulatorState, payload: bytes) -> EmulatorState:
-        message = decode(payload, self.topics.types[self.topics.cmd_vel])
-        twist = message.twist if isinstance(message, msg.TwistStamped) else message
-        if not isinstance(twist, msg.Twist):
-            return state
-        wanted = STANDSTILL if state.stopped else Motion(twist.linear.x, twist.angular.z)
+        wanted = STANDSTILL if state.stopped else read_drive(payload, stamped=self.topics.stamped)
         follower = state.follower.told(self.actuators.accept(wanted))
         return replace(state, follower=follower, commanded=True)
 
@@ -195,6 +192,10 @@ class EmulatorNode:
             )
             message = odometry_message(at_ns, name, body.pose, measured)
             out.append(outgoing(f"{name}/odom", message, at_ns))
+        leader_drives = drive_message(
+            state.leader.command, at_ns, self.topics.leader, stamped=self.topics.stamped
+        )
+        out.append(outgoing(self.topics.leader_cmd_vel, leader_drives, at_ns))
         return replace(state, odometry=number + 1)
 
     def _capture_ns(self, state: EmulatorState) -> int:

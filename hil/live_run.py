@@ -7,16 +7,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from formation.pose import STANDSTILL
 from hil import message_types as msg
 from hil import topics
 from hil.child_processes import Children
 from hil.live_daemon import Ending
 from hil.live_watch import Picture, Watch
-from hil.messages import encode, header
+from hil.messages import encode
 from hil.scenario import Scenario
 from hil.scenario_file import scenario_text
 from hil.session import Endpoints, close_session, open_session
 from hil.topics import topics_of
+from hil.twist_wire import drive_message
 from hil.wire import Wire
 
 DAEMONS = ("recorder", "estimator", "controller", "emulator")
@@ -123,11 +125,7 @@ class _Supervisor:
         time.sleep(_GLANCE)
 
     def _standstill(self) -> msg.Message:
-        zero = msg.Vector3(x=0.0, y=0.0, z=0.0)
-        twist = msg.Twist(linear=zero, angular=zero)
-        if not self._names.stamped:
-            return twist
-        return msg.TwistStamped(header=header(time.time_ns(), self._names.follower), twist=twist)
+        return drive_message(STANDSTILL, time.time_ns(), self._names.follower, stamped=self._names.stamped)
 
 
 def _waiting(picture: Picture) -> str:

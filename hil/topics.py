@@ -41,6 +41,11 @@ class Topics:
         return f"{self.leader}/odom"
 
     @property
+    def leader_cmd_vel(self) -> str:
+        """What the leader is told to drive; read by the law ``ideal`` only, which needs its turn rate."""
+        return f"{self.leader}/cmd_vel"
+
+    @property
     def odom(self) -> str:
         """Wheel odometry of the follower."""
         return f"{self.follower}/odom"
@@ -73,6 +78,7 @@ class Topics:
             RIGID_BODIES: typename_of(RigidBodies),
             self.leader_odom: typename_of(Odometry),
             self.odom: typename_of(Odometry),
+            self.leader_cmd_vel: typename_of(drive),
             self.cmd_vel: typename_of(drive),
             self.sighting: typename_of(RangeBearing),
             self.estimate: typename_of(LeaderEstimate),

@@ -92,13 +92,11 @@ def _lockstep(scenario: Scenario, log_path: Path) -> str:
 def _live(scenario: Scenario, folder: Path, log_path: Path, listen: str | None) -> str:
     from rich.console import Console
 
-    from hil.controller_node import ControllerNode
     from hil.live_daemon import Ending
     from hil.live_run import run_live
     from hil.live_watch import Picture
     from hil.session import free_endpoint
 
-    ControllerNode(scenario)  # a law that cannot run is better refused here than by a daemon
     ending = Ending()
     ending.on_signals()
     console = Console(file=sys.stderr)
