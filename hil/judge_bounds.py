@@ -29,14 +29,14 @@ class WorstErrors:
 def judge_bounds(scenario: Scenario, columns: Columns) -> dict[str, object]:
     """The ``bounds`` part of a summary.
 
-    ``M_rho``, ``M_alpha2``: the rate errors that the bounds rest on, of :func:`error_bounds`; where they
+    ``M_rho``, ``M_alpha2``: the rate errors that the bounds rest on, of :func:`worst_errors`; where they
     change from sample to sample, the largest. ``checked``: samples at which the truth is known; without any
     there are neither violations nor tightness.
     """
     samples, true = columns.samples, columns.true
     if not len(samples.capture_ns):
         return {"v_eps": scenario.leader.v_eps, "checked": 0}
-    given = error_bounds(scenario, columns)
+    given = worst_errors(scenario, columns)
     known = np.isfinite(true.rho) & np.isfinite(true.v1) & np.isfinite(true.alpha1)
     result: dict[str, object] = {
         "M_rho": float(np.max(given.rates.M_rho)),
@@ -73,7 +73,7 @@ def named_bounds(scenario: Scenario, columns: Columns, given: WorstErrors) -> di
     return {name: np.broadcast_to(bound, (n,)) for name, bound in bounds.items()}
 
 
-def error_bounds(scenario: Scenario, columns: Columns) -> WorstErrors:
+def worst_errors(scenario: Scenario, columns: Columns) -> WorstErrors:
     """Bounds of rate and input errors: of a quantity whose truth is known, the samples' largest error.
 
     Of any other, the error that the scenario's noise lets assume at each sample's distance.

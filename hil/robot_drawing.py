@@ -1,0 +1,102 @@
+"""Two robots from above: their tracks, and the robots themselves in their true size at chosen moments."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle, Polygon
+from matplotlib.transforms import Affine2D
+from numpy.typing import NDArray
+
+from formation.angles import FloatArray
+
+LEADER, FOLLOWER, LINE = "#1f5fa8", "#d9741a", "#8a8a8a"
+
+# TurtleBot3 Burger: 0.138 m long, 0.178 m over its wheels.
+_BODY_RADIUS = 0.069
+_WHEEL_LENGTH, _WHEEL_WIDTH, _WHEEL_OFFSET = 0.066, 0.02, 0.079
+_NOSE = ((0.05, 0.0), (-0.034, 0.036), (-0.016, 0.0), (-0.034, -0.036))
+_STEPS = tuple(base * 10.0**power for power in range(-1, 5) for base in (1.0, 2.0, 5.0))
+_MOST_MOMENTS = 7
+_SMALLEST_SHARE = 0.05
+"""Where the tracks are so long that a robot would be smaller than this share of them, it is drawn larger."""
+
+
+def draw_pair(axes: Axes, t: FloatArray, leader: FloatArray, follower: FloatArray) -> None:
+    """Tracks of both robots, rows x, y, theta at the times t [s], and the robots at a few round moments.
+
+    A line joins the two at each moment; the moment is written beside the follower. Rows with NaN are gaps.
+    """
+    scale = _scale(leader, follower)
+    for poses, colour, label in ((leader, LEADER, "leader"), (follower, FOLLOWER, "follower")):
+        axes.plot(poses[:, 0], poses[:, 1], color=colour, lw=1.3, alpha=0.75, label=label, zorder=2)
+    rows = _moments(t, np.all(np.isfinite(leader), axis=1) & np.all(np.isfinite(follower), axis=1))
+    for row, opacity in zip(rows, np.linspace(0.35, 1.0, len(rows)).tolist(), strict=True):
+        ends = np.stack([leader[row, :2], follower[row, :2]])
+        axes.plot(ends[:, 0], ends[:, 1], color=LINE, lw=0.8, alpha=opacity, zorder=1)
+        draw_robot(axes, leader[row], scale, LEADER, opacity)
+        draw_robot(axes, follower[row], scale, FOLLOWER, opacity)
+        _write_moment(axes, f"{t[row]:.3g} s", leader[row], follower[row], scale)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.09)
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    axes.grid(alpha=0.25)
+    axes.legend(loc="best", frameon=False, fontsize=9)
+
+
+def draw_robot(axes: Axes, pose: FloatArray, scale: float, colour: str, opacity: float) -> None:
+    """One robot at a pose x, y, theta: wheels, body, nose ahead. ``scale`` 1 is true size."""
+    x, y, theta = (float(value) for value in pose)
+    place = Affine2D().scale(scale).rotate(theta).translate(x, y)
+    for side in (_WHEEL_OFFSET, -_WHEEL_OFFSET):
+        half_length, half_width = 0.5 * _WHEEL_LENGTH, 0.5 * _WHEEL_WIDTH
+        corners = [
+            (-half_length, side - half_width),
+            (half_length, side - half_width),
+            (half_length, side + half_width),
+            (-half_length, side + half_width),
+        ]
+        wheel = place.transform(corners)
+        axes.add_patch(Polygon(wheel, closed=True, facecolor="#333333", lw=0, alpha=opacity, zorder=3))
+    axes.add_patch(
+        Circle(
+            (x, y),
+            scale * _BODY_RADIUS,
+            facecolor=colour,
+            edgecolor="white",
+            lw=0.7,
+            alpha=opacity,
+            zorder=3.5,
+        )
+    )
+    nose = place.transform(_NOSE)
+    axes.add_patch(Polygon(nose, closed=True, facecolor="white", lw=0, alpha=opacity, zorder=4))
+
+
+def _scale(leader: FloatArray, follower: FloatArray) -> float:
+    places = np.concatenate([leader[:, :2], follower[:, :2]])
+    extent = float(np.max(np.nanmax(places, axis=0) - np.nanmin(places, axis=0)))
+    return max(1.0, _SMALLEST_SHARE * extent / (2.0 * _BODY_RADIUS))
+
+
+def _moments(t: FloatArray, known: NDArray[np.bool_]) -> list[int]:
+    """Rows at which the robots are drawn: whole multiples of a round step, few enough to tell apart."""
+    rows = np.flatnonzero(known)
+    span = float(t[rows[-1]] - t[rows[0]])
+    step = next((step for step in _STEPS if span / step <= _MOST_MOMENTS), span)
+    if step <= 0.0:
+        return [int(rows[0])]
+    wanted = np.arange(math.ceil(t[rows[0]] / step - 1e-6), math.floor(t[rows[-1]] / step + 1e-6) + 1) * step
+    nearest = np.abs(t[rows][np.newaxis, :] - wanted[:, np.newaxis]).argmin(axis=1)
+    return [int(row) for row in np.unique(rows[nearest])]
+
+
+def _write_moment(axes: Axes, text: str, leader: FloatArray, follower: FloatArray, scale: float) -> None:
+    """Write on the side of the follower that faces away from the leader."""
+    away = math.atan2(follower[1] - leader[1], follower[0] - leader[0])
+    reach = scale * (_BODY_RADIUS + 0.07)
+    place = (float(follower[0]) + reach * math.cos(away), float(follower[1]) + reach * math.sin(away))
+    axes.annotate(text, place, ha="center", va="center", fontsize=8, color="#555555", zorder=5)
