@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +54,9 @@ def _figure(shown: Shown) -> Figure:
         stacks, below = [[*stacks[0], *below], stacks[1]], []
     widths = ([_TRACKS_WIDTH] if tracks else []) + [_STACK_WIDTH for stack in stacks if stack]
     width = sum(widths) + _LEFT + _RIGHT + _BETWEEN * (len(widths) - 1)
-    figure = Figure(figsize=(max(width, _TRACKS_WIDTH), _HEIGHT), dpi=DPI)
+    figure = Figure(
+        figsize=(round(max(width, _TRACKS_WIDTH) * DPI) / DPI, round(_HEIGHT * DPI) / DPI), dpi=DPI
+    )
     edges = {"bottom": _BOTTOM / _HEIGHT, "top": 1.0 - _TOP / _HEIGHT}
     left = _LEFT
     if tracks:
@@ -109,15 +112,17 @@ def _draw_stack(rows: list[Axes], stack: list[Panel], shown: Shown) -> None:
     rows[-1].set_xlabel("t [s]")
     for axes in rows:
         axes.yaxis.set_label_coords(-_LABEL_OFFSET * DPI / axes.bbox.width, 0.5)
-        axes.yaxis.set_major_locator(MaxNLocator(5))
+        axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
 
 
 def _save(figure: Figure, path: Path) -> None:
     """Write the figure with a palette: a third of the bytes, and no difference to the eye."""
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-    picture.quantize(_COLOURS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE).save(path, "PNG")
+    FigureCanvasAgg(figure)
+    drawn = BytesIO()
+    figure.savefig(drawn, format="rgba", dpi=DPI)
+    size = (round(figure.bbox.width), round(figure.bbox.height))
+    picture = Image.frombuffer("RGBA", size, drawn.getvalue()).convert("RGB")
+    picture.quantize(_COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(path, "PNG")
 
 
 def _title(summary: Mapping[str, Any]) -> str:
