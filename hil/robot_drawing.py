@@ -32,13 +32,14 @@ def draw_pair(axes: Axes, t: FloatArray, leader: FloatArray, follower: FloatArra
     scale = _scale(leader, follower)
     for poses, colour, label in ((leader, LEADER, "leader"), (follower, FOLLOWER, "follower")):
         axes.plot(poses[:, 0], poses[:, 1], color=colour, lw=1.3, alpha=0.75, label=label, zorder=2)
-    rows = _moments(t, np.all(np.isfinite(leader), axis=1) & np.all(np.isfinite(follower), axis=1))
-    for row, opacity in zip(rows, np.linspace(0.35, 1.0, len(rows)).tolist(), strict=True):
+    moments = _moments(t, np.all(np.isfinite(leader), axis=1) & np.all(np.isfinite(follower), axis=1))
+    opacities = np.linspace(0.35, 1.0, len(moments)).tolist()
+    for (row, moment), opacity in zip(moments.items(), opacities, strict=True):
         ends = np.stack([leader[row, :2], follower[row, :2]])
         axes.plot(ends[:, 0], ends[:, 1], color=LINE, lw=0.8, alpha=opacity, zorder=1)
         draw_robot(axes, leader[row], scale, LEADER, opacity)
         draw_robot(axes, follower[row], scale, FOLLOWER, opacity)
-        _write_moment(axes, f"{t[row]:.3g} s", leader[row], follower[row], scale)
+        _write_moment(axes, f"{moment:.3g} s", leader[row], follower[row], scale)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.09)
     axes.set_xlabel("x [m]")
@@ -82,16 +83,16 @@ def _scale(leader: FloatArray, follower: FloatArray) -> float:
     return max(1.0, _SMALLEST_SHARE * extent / (2.0 * _BODY_RADIUS))
 
 
-def _moments(t: FloatArray, known: NDArray[np.bool_]) -> list[int]:
-    """Rows at which the robots are drawn: whole multiples of a round step, few enough to tell apart."""
+def _moments(t: FloatArray, known: NDArray[np.bool_]) -> dict[int, float]:
+    """Rows at which the robots are drawn, with their times: multiples of a round step, not too many."""
     rows = np.flatnonzero(known)
-    span = float(t[rows[-1]] - t[rows[0]])
-    step = next((step for step in _STEPS if span / step <= _MOST_MOMENTS), span)
+    first, last = float(t[rows[0]]), float(t[rows[-1]])
+    step = next((step for step in _STEPS if (last - first) / step <= _MOST_MOMENTS), last - first)
     if step <= 0.0:
-        return [int(rows[0])]
-    wanted = np.arange(math.ceil(t[rows[0]] / step - 1e-6), math.floor(t[rows[-1]] / step + 1e-6) + 1) * step
-    nearest = np.abs(t[rows][np.newaxis, :] - wanted[:, np.newaxis]).argmin(axis=1)
-    return [int(row) for row in np.unique(rows[nearest])]
+        return {int(rows[0]): first}
+    # A recording that begins or ends a little off a multiple still shows its first and last moment.
+    whole = range(math.ceil(first / step - 0.1), math.floor(last / step + 0.1) + 1)
+    return {int(rows[np.abs(t[rows] - count * step).argmin()]): count * step for count in whole}
 
 
 def _write_moment(axes: Axes, text: str, leader: FloatArray, follower: FloatArray, scale: float) -> None:

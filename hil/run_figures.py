@@ -111,6 +111,7 @@ def _draw_stack(rows: list[Axes], stack: list[Panel], shown: Shown) -> None:
         )
     rows[-1].set_xlabel("t [s]")
     for axes in rows:
+        axes.xaxis.set_major_locator(MaxNLocator(7, steps=[1, 2, 5, 10]))
         axes.yaxis.set_label_coords(-_LABEL_OFFSET * DPI / axes.bbox.width, 0.5)
         axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
 

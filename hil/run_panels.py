@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
-from estimation.bound_check import ROUNDING
+from estimation.bounds import Values
 from estimation.estimate import QUANTITIES
 from estimation.tracking import Status
 from formation.angles import FloatArray, wrap
@@ -20,11 +19,13 @@ from hil.evidence import Evidence
 from hil.evidence_columns import Columns, EstimateColumns
 from hil.judge_bounds import named_bounds, worst_errors
 from hil.noise_free_orbit import NoiseFreeOrbit
+from hil.panel_strokes import LIMIT, broken_at_jumps, draw_bounds, limit_to, mark_violations, with_gaps
 from hil.robot_drawing import FOLLOWER
 from hil.true_states import Stamps, TrueStates
 
-TRUE, BELIEVED, ORBIT, LIMIT, BAND, GRID = "#3c3c3c", "#2a8f4c", "#7a5fa8", "#b03030", "#2a8f4c", 0.25
-_GAP = 0.5
+TRUE, BELIEVED, ORBIT, BAND = "#3c3c3c", "#2a8f4c", "#7a5fa8", "#2a8f4c"
+_FARTHEST = 4.0
+"""A bound that is so many times out of the picture is left out: it would flatten the rest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +68,7 @@ class Shown:
 
 def draw_distance(axes: Axes, shown: Shown) -> None:
     """Distance: true (estimated where the truth is not known), on the noise-free orbit, and desired."""
-    axes.axhline(shown.evidence.scenario.formation.rho_0, color=LIMIT, lw=1.0, ls=":", label=r"$\rho_0$")
+    _draw_desired(axes, shown, shown.evidence.scenario.formation.rho_0, r"$\rho_0$")
     _draw_shape(axes, shown, shown.columns.truth.rho, shown.tracked.seen.rho, 0)
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel(r"$\rho$ [m]")
@@ -75,14 +76,14 @@ def draw_distance(axes: Axes, shown: Shown) -> None:
 
 def draw_alpha1(axes: Axes, shown: Shown) -> None:
     """Bearing of the follower from the leader, as :func:`draw_distance`."""
-    axes.axhline(ABREAST_ALPHA1, color=LIMIT, lw=1.0, ls=":", label=r"$-\pi/2$")
+    _draw_desired(axes, shown, ABREAST_ALPHA1, r"$-\pi/2$")
     _draw_shape(axes, shown, shown.columns.truth.alpha1, shown.tracked.seen.alpha1, 1)
     axes.set_ylabel(r"$\alpha_1$ [rad]")
 
 
 def draw_alpha2(axes: Axes, shown: Shown) -> None:
     """Bearing of the leader from the follower, as :func:`draw_distance`."""
-    axes.axhline(ABREAST_ALPHA2, color=LIMIT, lw=1.0, ls=":", label=r"$\pi/2$")
+    _draw_desired(axes, shown, ABREAST_ALPHA2, r"$\pi/2$")
     _draw_shape(axes, shown, shown.columns.truth.alpha2, shown.tracked.seen.alpha2, 2)
     axes.set_ylabel(r"$\alpha_2$ [rad]")
 
@@ -92,17 +93,19 @@ def draw_v1(axes: Axes, shown: Shown) -> None:
     columns, seen = shown.columns, shown.tracked.seen
     t, v1, sd = shown.seconds(shown.tracked.capture_ns), np.asarray(seen.v1), shown.tracked.sd[:, 2]
     axes.fill_between(t, v1 - 3.0 * sd, v1 + 3.0 * sd, color=BAND, alpha=0.2, lw=0, label=r"$3\sigma$")
-    axes.plot(*_with_gaps(t, v1), color=BELIEVED, lw=0.9, label="estimate")
+    axes.plot(*with_gaps(t, v1), color=BELIEVED, lw=0.9, label="estimate")
     if np.any(np.isfinite(columns.truth.v1)):
         axes.plot(
             shown.seconds(columns.truth.capture_ns), columns.truth.v1, color=TRUE, lw=1.2, label="truth"
         )
+    reach = max(shown.evidence.scenario.leader.k_v, float(np.median(v1)))
     judged = shown.seconds(columns.samples.capture_ns)
     if "v1" in shown.bounds:
         bound, centre = shown.bounds["v1" + shown.drawn_bound], np.asarray(columns.samples.seen.v1)
-        _draw_bounds(axes, judged, centre - bound, centre + bound, shown.drawn_bound)
-        _mark_violations(axes, judged, centre, np.abs(centre - columns.true.v1), bound)
-    _limit_to(axes, 0.0, 1.8 * max(shown.evidence.scenario.leader.k_v, float(np.median(v1))))
+        if np.min(bound) < reach:
+            draw_bounds(axes, judged, centre - bound, centre + bound, shown.drawn_bound)
+        mark_violations(axes, judged, centre, np.abs(centre - columns.true.v1), bound)
+    limit_to(axes, 0.0, 1.8 * reach)
     axes.set_ylabel("$v_1$ [m/s]")
 
 
@@ -112,16 +115,18 @@ def draw_alpha1_error(axes: Axes, shown: Shown) -> None:
     t, sd = shown.seconds(shown.tracked.capture_ns), shown.tracked.sd[:, QUANTITIES.index("alpha1")]
     error = wrap(np.asarray(shown.tracked.seen.alpha1) - shown.tracked_true.alpha1)
     axes.fill_between(t, -3.0 * sd, 3.0 * sd, color=BAND, alpha=0.2, lw=0, label=r"$3\sigma$")
-    axes.plot(*_with_gaps(t, error), color=BELIEVED, lw=0.9, label="error")
+    axes.plot(*with_gaps(t, error), color=BELIEVED, lw=0.9, label="error")
     reach = 4.0 * float(np.median(sd))
     judged = shown.seconds(columns.samples.capture_ns)
     if "alpha1" in shown.bounds:
         bound = shown.bounds["alpha1" + shown.drawn_bound]
         at_samples = wrap(np.asarray(columns.samples.seen.alpha1) - columns.true.alpha1)
-        _draw_bounds(axes, judged, -bound, bound, shown.drawn_bound)
-        _mark_violations(axes, judged, at_samples, np.abs(at_samples), bound)
         largest = float(np.nanmax(np.abs(at_samples), initial=0.0))
-        reach = max(reach, 1.5 * largest, min(1.15 * float(np.max(bound)), 10.0 * reach))
+        reach = max(reach, 1.5 * largest)
+        if np.max(bound) < _FARTHEST * reach:
+            reach = max(reach, 1.15 * float(np.max(bound)))
+            draw_bounds(axes, judged, -bound, bound, shown.drawn_bound)
+        mark_violations(axes, judged, at_samples, np.abs(at_samples), bound)
     axes.set_ylim(-min(reach, math.pi), min(reach, math.pi))
     axes.set_ylabel(r"$\hat\alpha_1 - \alpha_1$ [rad]")
 
@@ -130,12 +135,12 @@ def draw_u1(axes: Axes, shown: Shown) -> None:
     """Leader's turn rate: estimate with three standard deviations, and truth."""
     t, u1, sd = shown.seconds(shown.tracked.capture_ns), shown.tracked.u1, shown.tracked.sd[:, 4]
     axes.fill_between(t, u1 - 3.0 * sd, u1 + 3.0 * sd, color=BAND, alpha=0.2, lw=0, label=r"$3\sigma$")
-    axes.plot(*_with_gaps(t, u1), color=BELIEVED, lw=0.9, label="estimate")
+    axes.plot(*with_gaps(t, u1), color=BELIEVED, lw=0.9, label="estimate")
     truth = shown.columns.truth
     if np.any(np.isfinite(truth.u1)):
         axes.plot(shown.seconds(truth.capture_ns), truth.u1, color=TRUE, lw=1.2, label="truth")
     reach = 2.0 * shown.evidence.scenario.leader.k_u
-    _limit_to(axes, -reach, reach)
+    limit_to(axes, -reach, reach)
     axes.set_ylabel("$u_1$ [rad/s]")
 
 
@@ -192,28 +197,27 @@ def panels_for(shown: Shown) -> tuple[list[Panel], list[Panel], list[Panel]]:
     return wire, shape, motion
 
 
-def _draw_shape(axes: Axes, shown: Shown, true: FloatArray, seen: Any, column: int) -> None:
+def _draw_desired(axes: Axes, shown: Shown, value: float, label: str) -> None:
+    """Where the formation wants a quantity; other labs' robots were not told."""
+    if shown.evidence.motion_since_ns is not None:
+        axes.axhline(value, color=LIMIT, lw=1.0, ls=":", label=label)
+
+
+def _draw_shape(axes: Axes, shown: Shown, true: FloatArray, seen: Values, column: int) -> None:
+    """True and noise-free course of a quantity; what was estimated where one of them is missing."""
     moments = shown.columns.truth.capture_ns
+    known = bool(np.any(np.isfinite(true)))
     if shown.orbit is not None:
         wanted = moments[moments >= shown.orbit.from_ns]
-        ideal = shown.orbit.at(wanted)[column]
-        axes.plot(
-            *_with_gaps(shown.seconds(wanted), _broken_at_jumps(ideal)),
-            color=ORBIT,
-            lw=1.1,
-            ls="--",
-            label="noise-free",
-            zorder=3,
-        )
-    if np.any(np.isfinite(true)):
-        axes.plot(
-            *_with_gaps(shown.seconds(moments), _broken_at_jumps(true)), color=TRUE, lw=1.4, label="truth"
-        )
-    else:
+        ideal = with_gaps(shown.seconds(wanted), broken_at_jumps(shown.orbit.at(wanted)[column]))
+        axes.plot(*ideal, color=ORBIT, lw=1.1, ls="--", label="noise-free", zorder=3)
+    if known:
+        truth = with_gaps(shown.seconds(moments), broken_at_jumps(true))
+        axes.plot(*truth, color=TRUE, lw=1.4, label="truth")
+    if shown.orbit is None or not known:
         t = shown.seconds(shown.tracked.capture_ns)
-        axes.plot(
-            *_with_gaps(t, _broken_at_jumps(np.asarray(seen))), color=BELIEVED, lw=1.0, label="estimate"
-        )
+        estimate = with_gaps(t, broken_at_jumps(np.asarray(seen)))
+        axes.plot(*estimate, color=BELIEVED, lw=1.1, label="estimate")
 
 
 def _draw_command(axes: Axes, shown: Shown, sent: FloatArray, limit: float) -> None:
@@ -224,37 +228,3 @@ def _draw_command(axes: Axes, shown: Shown, sent: FloatArray, limit: float) -> N
     near = [side for side in (limit, -limit) if 1.6 * low <= side <= 1.6 * high]
     for index, side in enumerate(near):
         axes.axhline(side, color=LIMIT, lw=1.0, ls=":", label="limit" if index == 0 else None)
-
-
-def _draw_bounds(axes: Axes, t: FloatArray, low: FloatArray, high: FloatArray, suffix: str) -> None:
-    label = "extended bound" if suffix else "bound"
-    for index, side in enumerate((low, high)):
-        axes.plot(*_with_gaps(t, side), color=LIMIT, lw=0.9, alpha=0.8, label=label if index == 0 else None)
-
-
-def _mark_violations(
-    axes: Axes, t: FloatArray, where: FloatArray, error: FloatArray, bound: FloatArray
-) -> None:
-    broken: NDArray[np.bool_] = np.isfinite(error) & (error > bound + ROUNDING)
-    if np.any(broken):
-        label = f"violated ({np.count_nonzero(broken)})"
-        axes.plot(t[broken], where[broken], ls="none", marker="x", ms=5, mew=1.5, color=LIMIT, label=label)
-
-
-def _limit_to(axes: Axes, low: float, high: float) -> None:
-    """Cut the axis where a quantity cannot sensibly be; what is drawn there belongs to the settling."""
-    bottom, top = axes.get_ylim()
-    axes.set_ylim(max(bottom, low), min(top, high))
-
-
-def _with_gaps(t: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Values with NaN where the time jumps, so that no line pretends to know what lies between."""
-    holes = np.flatnonzero(np.diff(t) > _GAP) + 1
-    return np.insert(t, holes, math.nan), np.insert(values, holes, math.nan)
-
-
-def _broken_at_jumps(angle: FloatArray) -> FloatArray:
-    """Angle with NaN where it passes through pi, so that no line is drawn across the panel."""
-    broken = angle.copy()
-    broken[1:][np.abs(np.diff(angle)) > math.pi] = math.nan
-    return broken
