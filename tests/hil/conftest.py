@@ -1,11 +1,19 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
+from estimation.tracking import Status
+from formation import pose as plane
+from formation.angles import wrap
+from formation.shape import Shape, follower_pose, shape_of, shape_rates
+from hil.evidence import Evidence, Frames, LogFacts
+from hil.lockstep_run import run_lockstep
+from hil.log_reader import Log, read_log
 from hil.message_types import (
     Command,
     Consumed,
@@ -31,6 +39,7 @@ from hil.message_types import (
     Vector3,
 )
 from hil.messages import header, to_time
+from hil.scenario_file import load_scenario
 
 STAMP_NS = 1_700_000_000_123_456_789
 
@@ -107,3 +116,88 @@ def _plain(value: object) -> object:
 def plain() -> Callable[[object], object]:
     """Turn a message of any library into dictionaries, lists and numbers."""
     return _plain
+
+
+@pytest.fixture(scope="session")
+def short_log(tmp_path_factory: pytest.TempPathFactory) -> Log:
+    """A lockstep run of 6 s with 5 % of the frames lost, judged from 3 s on."""
+    path = tmp_path_factory.mktemp("short") / "run.mcap"
+    given = ("run.seed=7", "run.duration_s=6.0", "run.evaluate_from_s=3.0", "mocap.loss=0.05")
+    run_lockstep(load_scenario("turtlebot3", given), path)
+    return read_log(path)
+
+
+@pytest.fixture(scope="session")
+def exact_evidence() -> Evidence:
+    """A made-up run of 4 s, judged from 1 s on: a leader on a circle, a follower abreast, no error at all."""
+    scenario = load_scenario("turtlebot3", ["run.duration_s=4.0", "run.evaluate_from_s=1.0"])
+    shape, leads, follows = (
+        Shape(0.2, -0.5 * math.pi, 0.5 * math.pi),
+        plane.Motion(0.08, 0.3),
+        plane.Motion(0.14, 0.3),
+    )
+    leader, truth = plane.Pose(0.3, 0.0, 3.0), []
+    for number in range(241):
+        follower = follower_pose(shape, leader)
+        truth.append(
+            Truth(
+                header(STAMP_NS + number * FRAME_NS, "mocap"),
+                number,
+                *(leader.x, leader.y, leader.theta, leads.v, leads.u),
+                *(follower.x, follower.y, follower.theta, follows.v, follows.u),
+            )
+        )
+        leader = plane.advance(leader, leads.v, leads.u, FRAME_NS * 1e-9)
+    return Evidence(
+        scenario=scenario,
+        mode="lockstep",
+        estimates=[_exact_estimate(each) for each in truth],
+        commands=[_exact_command(each) for each in truth],
+        truth=truth,
+        taken={"frames": 241, "used": 240, "odometry": 120},
+        refused={"gated": 1},
+        zero_ns=STAMP_NS,
+        motion_since_ns=STAMP_NS,
+        frames=Frames(241, [STAMP_NS + number * FRAME_NS for number in range(241)]),
+        log=LogFacts("run.mcap", 1000, 123_456),
+    )
+
+
+FRAME_NS = 16_666_667
+
+
+def _exact_estimate(truth: Truth) -> LeaderEstimate:
+    shape = shape_of(
+        plane.Pose(truth.leader_x, truth.leader_y, truth.leader_theta),
+        plane.Pose(truth.follower_x, truth.follower_y, truth.follower_theta),
+    )
+    rates = shape_rates(shape, plane.Motion(truth.v1, truth.u1), plane.Motion(truth.v2, truth.u2))
+    return LeaderEstimate(
+        header=truth.header,
+        measured=truth.header.stamp,
+        computed=truth.header.stamp,
+        rho=shape.rho,
+        alpha2=shape.alpha2,
+        rho_dot=rates.rho_dot,
+        alpha2_dot=rates.alpha2_dot,
+        v1=truth.v1,
+        alpha1=float(wrap(shape.alpha1)),
+        u1=truth.u1,
+        v2=truth.v2,
+        u2=truth.u2,
+        covariance=np.diag([1e-6, 1e-4, 1e-6, 1e-4, 1e-2]).reshape(25),
+        nis=2.0,
+        status=int(Status.TRACKING),
+        reason="",
+        bound_v1=0.05,
+        bound_alpha1=0.5,
+        bound_h=1.0,
+        consumed=[],
+    )
+
+
+def _exact_command(truth: Truth) -> Command:
+    """Issued 30 ms after the capture that it rests on."""
+    stamp = truth.header.stamp
+    issued = header(stamp.sec * 10**9 + stamp.nanosec + 30_000_000, "follower")
+    return Command(issued, stamp, stamp, truth.v2, truth.u2, truth.v2, truth.u2, False, "", True, [])
