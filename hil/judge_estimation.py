@@ -92,6 +92,8 @@ def _efficiency(evidence: Evidence, columns: Columns, rmse: Mapping[str, float])
     pose_noise, sd_v2, sd_u2 = _noise(given, emulated=evidence.motion_since_ns is not None)
     if given.estimator.front_end != "world" or evidence.frames is None or pose_noise.position == 0.0:
         return {}
+    if not rmse:
+        return {}
     truth = columns.truth
     near = (truth.capture_ns >= columns.span.from_ns - WARM_UP_NS) & (truth.capture_ns <= columns.span.to_ns)
     heading = truth.leader[near, 2]

@@ -121,7 +121,7 @@ def draw_alpha1_error(axes: Axes, shown: Shown) -> None:
     if "alpha1" in shown.bounds:
         bound = shown.bounds["alpha1" + shown.drawn_bound]
         at_samples = wrap(np.asarray(columns.samples.seen.alpha1) - columns.true.alpha1)
-        largest = float(np.nanmax(np.abs(at_samples), initial=0.0))
+        largest = float(np.max(np.abs(at_samples), where=np.isfinite(at_samples), initial=0.0))
         reach = max(reach, 1.5 * largest)
         if np.max(bound) < _FARTHEST * reach:
             reach = max(reach, 1.15 * float(np.max(bound)))
