@@ -218,12 +218,15 @@ def _frames(
     """
     got = {receipt.digest for estimate in estimates for receipt in estimate.consumed}
     taken_in = [record for record in records if digest(record.topic, record.payload) in got]
-    captured = {each.frame_number for each in truth}
-    found = {
-        frame.frame_number: to_ns(frame.header.stamp)
-        for frame in _decoded(log, taken_in, RigidBodies)
-        if not captured or frame.frame_number in captured
-    }
+    captured = {each.frame_number: to_ns(each.header.stamp) for each in truth}
+    found: dict[int, int] = {}
+    for frame in _decoded(log, taken_in, RigidBodies):
+        try:
+            stamp_ns = to_ns(frame.header.stamp)
+        except MalformedPayloadError:
+            continue  # the estimator refused it too
+        if not captured or captured.get(frame.frame_number) == stamp_ns:
+            found[frame.frame_number] = stamp_ns
     numbers = sorted(found)
     if len(numbers) < 2:
         return None
