@@ -40,7 +40,7 @@ def draw_run(evidence: Evidence, summary: Mapping[str, Any], path: Path) -> None
     columns = columns_of(evidence)
     driven = evidence.motion_since_ns is not None
     orbit = noise_free_orbit(evidence.scenario, columns.truth, columns.run) if driven else None
-    shown = Shown.of(evidence, summary, columns, orbit)
+    shown = Shown.of(evidence, columns, orbit)
     figure = _figure(shown)
     figure.suptitle(_title(summary), fontsize=11, y=1.0 - 0.1 / _HEIGHT)
     _save(figure, path)

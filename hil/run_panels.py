@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -36,7 +35,6 @@ class Shown:
     """
 
     evidence: Evidence
-    summary: Mapping[str, Any]
     columns: Columns
     tracked: EstimateColumns
     tracked_true: TrueStates
@@ -44,9 +42,7 @@ class Shown:
     orbit: NoiseFreeOrbit | None
 
     @staticmethod
-    def of(
-        evidence: Evidence, summary: Mapping[str, Any], columns: Columns, orbit: NoiseFreeOrbit | None
-    ) -> Shown:
+    def of(evidence: Evidence, columns: Columns, orbit: NoiseFreeOrbit | None) -> Shown:
         """Gather what the panels need."""
         during = columns.estimates.capture_ns <= columns.run.to_ns
         tracked = columns.estimates.only((columns.estimates.status == Status.TRACKING) & during)
@@ -54,7 +50,7 @@ class Shown:
         if len(columns.samples.capture_ns):
             bounds = named_bounds(evidence.scenario, columns, worst_errors(evidence.scenario, columns))
         true = columns.truth.at(tracked.capture_ns)
-        return Shown(evidence, summary, columns, tracked, true, bounds, orbit)
+        return Shown(evidence, columns, tracked, true, bounds, orbit)
 
     def seconds(self, moments_ns: Stamps) -> FloatArray:
         """Moments as seconds of the run."""
