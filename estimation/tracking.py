@@ -118,8 +118,9 @@ class Tracker:
     def add(self, track: Track, measurement: Measurement) -> tuple[Track, Verdict]:
         """Fold a measurement in at its place in time; return the new track and what became of it.
 
-        A measurement of a capture time that the track has is a DUPLICATE, one from before the ring is LATE:
-        both leave the track as it is. The verdict of one folded in late is that at its own place.
+        A measurement of a capture time that the track has is a DUPLICATE, one from before the window or
+        before the track began is LATE: both leave the track as it is. The verdict of one folded in late is
+        that at its own place.
         """
         if not track:
             return (self._begin(measurement, Verdict.RESTARTED),), Verdict.RESTARTED
@@ -130,7 +131,7 @@ class Tracker:
         place = bisect.bisect_left(times, measurement.capture_ns)
         if times[place] == measurement.capture_ns:
             return track, Verdict.DUPLICATE
-        if place == 0:
+        if place == 0 or measurement.capture_ns < self._window_begin_ns(track):
             return track, Verdict.LATE
         points = list(track[:place])
         for due in (measurement, *(point.measurement for point in track[place:])):
@@ -192,10 +193,14 @@ class Tracker:
             return False
         return belief.sd_heading < (settings.unsettled_heading if before else settings.settled_heading)
 
+    def _window_begin_ns(self, track: Track) -> int:
+        return track[-1].measurement.capture_ns - round(self.settings.window / _NS)
+
     def _trim(self, track: Track) -> Track:
-        oldest_ns = track[-1].measurement.capture_ns - round(self.settings.window / _NS)
-        keep = next(i for i, point in enumerate(track) if point.measurement.capture_ns >= oldest_ns)
-        return track[keep:] if keep else track
+        """Ring of the points in the window and the one before, which anything in the window can follow."""
+        oldest_ns = self._window_begin_ns(track)
+        first = next(i for i, point in enumerate(track) if point.measurement.capture_ns >= oldest_ns)
+        return track[first - 1 :] if first > 1 else track
 
 
 def _mean(a: FollowerMotion, b: FollowerMotion) -> FollowerMotion:
