@@ -43,12 +43,16 @@ class Belief:
 
     @property
     def sd_heading(self) -> float:
-        """Standard deviation [rad] of the leader's direction of motion; infinite while its speed is zero."""
+        """Standard deviation [rad] of the leader's direction of motion; infinite while its speed is zero.
+
+        Of the worst case, by the most uncertain axis of the velocity: an error along this axis makes the
+        velocity itself point along it, and what is uncertain across it is then little.
+        """
         speed = self.speed
         if speed == 0.0:
             return math.inf
-        across = np.array([-self.mean[3], self.mean[2]]) / speed
-        return math.sqrt(max(0.0, float(across @ self.covariance[2:4, 2:4] @ across))) / speed
+        (a, b), (_, d) = self.covariance[2:4, 2:4].tolist()
+        return math.sqrt(max(0.0, 0.5 * (a + d) + math.hypot(0.5 * (a - d), b))) / speed
 
 
 @dataclass(frozen=True, slots=True)
