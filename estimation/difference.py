@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation.belief import Belief, Model, Rates
 from estimation.measurement import FrontEnd, Measurement
-from estimation.motion import FollowerMotion
+from estimation.motion import FollowerMotion, Matrix, Vector
 from formation.angles import wrap
 
 
@@ -16,8 +16,8 @@ class DifferenceEstimator:
     """Rates by differences through a first-order low-pass of time constant ``cutoff`` [s].
 
     rho_dot and alpha2_dot give X and Y of the paper, these give w; u1 is the low-passed turn of w. The
-    covariance is that of white measurement noise through the same low-pass, plus its lag behind a leader
-    that turns at k_u.
+    covariance is that of white measurement noise through the same low-pass, of the follower's own motion as
+    measured, and of the lag behind a leader that turns at k_u.
     """
 
     def __init__(self, model: Model, cutoff: float) -> None:
@@ -61,22 +61,43 @@ class DifferenceEstimator:
         rates = Rates(rho, alpha2, rho_dot, alpha2_dot, heading, last.samples + 1)
         return Belief(mean, self._covariance(measurement, gain, dt, v1), rates)
 
-    def _covariance(
-        self, measurement: Measurement, gain: float, dt: float, v1: float
-    ) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-        """Variance of a smoothed difference of white noise, sigma^2 (gain/dt)^2 2/(2 - gain), and the lag."""
+    def _covariance(self, measurement: Measurement, gain: float, dt: float, v1: float) -> Matrix:
+        """Covariance (5, 5) of the state right after an update of the given gain.
+
+        A smoothed difference of white noise has the variance sigma^2 (gain/dt)^2 2/(2 - gain). The motion of
+        the follower enters unsmoothed: v2 ahead of it, rho u2 across the line of sight.
+        """
         smoothed = (gain / dt) ** 2 * 2.0 / (2.0 - gain)
-        limits = self.model.limits
-        lag = (self.cutoff * limits.k_u * max(v1, limits.v_eps)) ** 2
+        limits, motion = self.model.limits, measurement.motion
+        ahead, across = _axes(measurement)
+        lag = self.cutoff * limits.k_u * max(v1, limits.v_eps)
+        velocity = smoothed * _relative_covariance(measurement, across) + lag**2 * np.eye(2)
+        velocity += motion.sd_v2**2 * np.outer(ahead, ahead) + motion.sd_u2**2 * np.outer(across, across)
         covariance = np.zeros((5, 5))
         covariance[0:2, 0:2] = measurement.covariance
-        velocity = smoothed * measurement.covariance + lag * np.eye(2)
-        if measurement.pose_noise is not None:
-            velocity += smoothed * measurement.covariance
         covariance[2:4, 2:4] = velocity
-        across = float(np.trace(velocity)) / 2.0 / max(v1, limits.v_eps) ** 2
-        covariance[4, 4] = min(across * smoothed, limits.k_u**2)
+        sideways = float(np.trace(velocity)) / 2.0 / max(v1, limits.v_eps) ** 2
+        covariance[4, 4] = min(sideways * smoothed, limits.k_u**2)
         return covariance
+
+
+def _axes(measurement: Measurement) -> tuple[Vector, Vector]:
+    """Heading of the follower, and the left normal of the line to the leader times its length rho."""
+    pose = measurement.pose
+    if pose is None:
+        x, y = measurement.position.tolist()
+        return np.array([1.0, 0.0]), np.array([-y, x])
+    dx, dy = (measurement.position - [pose.x, pose.y]).tolist()
+    return np.array([math.cos(pose.theta), math.sin(pose.theta)]), np.array([-dy, dx])
+
+
+def _relative_covariance(measurement: Measurement, across: Vector) -> Matrix:
+    """Covariance (2, 2) of the leader's position as the follower sees it; a mocap pose adds its noise."""
+    noise = measurement.pose_noise
+    if noise is None:
+        return measurement.covariance
+    turned: Matrix = noise.heading**2 * np.outer(across, across)
+    return measurement.covariance + noise.position**2 * np.eye(2) + turned
 
 
 def _range_and_bearing(measurement: Measurement) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from estimation.belief import Model
 from estimation.estimate import Estimate, estimate_of
-from estimation.estimators import make_estimator
+from estimation.estimators import make_estimator, settling
 from estimation.inputs import History, InputTrust, follower_motion, remember
 from estimation.measurement import (
     FrontEnd,
@@ -83,12 +83,15 @@ class EstimatorNode:
         self.front_end = FrontEnd(given.front_end)
         limits = LeaderLimits(leader.v_eps, leader.k_v, leader.k_u)
         model = Model(self.front_end, limits, ProcessNoise.by_rule(limits, given.turn_bandwidth))
+        settled, unsettled = settling(given.kind)
         settings = TrackSettings(
             gate_probability=given.gate_probability,
             reacquire_frames=given.reacquire_frames,
             coast_after=given.coast_after_s,
             lost_after=given.lost_after_s,
             window=given.window_s,
+            settled_heading=settled,
+            unsettled_heading=unsettled,
         )
         self.tracker = Tracker(make_estimator(given.kind, model, given.difference_cutoff_s), settings)
         self.trust = InputTrust(given.sigma_v2, given.sigma_u2, given.input_delay_s, given.input_lag_s)
