@@ -103,7 +103,10 @@ def load_column_map(name_or_path: str) -> ColumnMap:
     """
     path = locate("map", MAPS, name_or_path)
     source = f"map {path.stem}"
-    file = checked(read_toml(path, "map"), _File, source)
+    tree = read_toml(path, "map")
+    if "topics" in tree:
+        raise UsageError(f"{source}: maps the topics of a log; take it to: abreast replay LOG --map {path}")
+    file = checked(tree, _File, source)
     if len(file.delimiter) != 1:
         raise UsageError(
             f"{source}: delimiter is {file.delimiter!r}, expected one character, such as ',' or ';'"

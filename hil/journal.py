@@ -46,11 +46,15 @@ class Repeated:
 
 @dataclass(frozen=True, slots=True)
 class Parity:
-    """How many outputs were compared, how many differ in any bit, and the place of the first that does."""
+    """How many outputs were compared, how many differ in any bit, and the place of the first that does.
+
+    ``unrecorded``: messages that went out beside them and are not in the log: nobody can compare them.
+    """
 
     compared: int
     mismatched: int
     first: int | None = None
+    unrecorded: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,30 +118,54 @@ def feed(node: Node[S], events: Iterable[Timed]) -> Journey[S]:
     return Journey(node.begin(0) if state is None else state, tuple(outputs))
 
 
-def parity_of(repeated: Sequence[Repeated], topic: str, beside: Mapping[str, Counter[int]]) -> Parity:
+def parity_of(repeated: Sequence[Repeated], topic: str, beside: Mapping[str, Sequence[int]]) -> Parity:
     """Compare repeated outputs with the recorded ones, bit for bit.
 
-    An output agrees if the node put out just that one payload on the topic and, on each topic of ``beside``,
-    only payloads that the log has too: there as many are left, by digest, as were logged.
+    An output agrees if the node put out just that one payload on the topic. ``beside``: what was logged, by
+    digest and in order, on topics that the node sends to as well; an output also differs if the log has
+    something else in the place of what went there. What the recorder missed there is only counted.
     """
-    left = {name: Counter(logged) for name, logged in beside.items()}
-    wrong = [
-        place
-        for place, step in enumerate(repeated)
-        if not _same_beside(step, left) or _payloads(step, topic) != [step.recorded.payload]
-    ]
-    return Parity(len(repeated), len(wrong), wrong[0] if wrong else None)
+    wrong = {
+        place for place, step in enumerate(repeated) if _payloads(step, topic) != [step.recorded.payload]
+    }
+    unrecorded = 0
+    for name, logged in beside.items():
+        sent = [
+            (digest(name, payload), place)
+            for place, step in enumerate(repeated)
+            for payload in _payloads(step, name)
+        ]
+        differing, missed = _compare_in_order(sent, logged)
+        wrong |= differing
+        unrecorded += missed
+    return Parity(len(repeated), len(wrong), min(wrong, default=None), unrecorded)
 
 
-def _same_beside(step: Repeated, left: dict[str, Counter[int]]) -> bool:
-    same = True
-    for message in step.outputs:
-        if message.topic not in left:
-            continue
-        name = digest(message.topic, message.payload)
-        same = same and left[message.topic][name] > 0
-        left[message.topic][name] -= 1
-    return same
+def _compare_in_order(sent: Sequence[tuple[int, int]], logged: Sequence[int]) -> tuple[set[int], int]:
+    """Places of what was sent and is logged as something else, and how much is not logged at all.
+
+    Both are walked in step. What one has and the other does not is passed over: the recorder can miss a
+    message, and others can send on the topic. Only where both happen at once, one was put for the other.
+    """
+    to_send, to_come = Counter(name for name, _ in sent), Counter(logged)
+    differing: set[int] = set()
+    missed = 0
+    at = 0
+    for name, place in sent:
+        lost = to_come[name] == 0
+        while at < len(logged) and logged[at] != name and to_send[logged[at]] == 0:
+            to_come[logged[at]] -= 1
+            at += 1
+            if lost:
+                differing.add(place)
+                break
+        to_send[name] -= 1
+        if at < len(logged) and logged[at] == name:
+            to_come[name] -= 1
+            at += 1
+        elif place not in differing:
+            missed += 1
+    return differing, missed
 
 
 def _payloads(step: Repeated, topic: str) -> list[bytes]:

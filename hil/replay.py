@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -100,7 +99,7 @@ def _with_commands(
     index = index_by_digest(logged_events(log, node.subscribes))
     journey = refeed(node, node.topics.command, recorded, index)
     drive = node.topics.cmd_vel
-    sent = Counter(digest(event.topic, event.payload) for event, _ in logged_events(log, [drive]))
+    sent = [digest(event.topic, event.payload) for event, _ in logged_events(log, [drive])]
     return Replay(
         scenario=scenario,
         estimates=_decoded(estimator.outputs, msg.LeaderEstimate),

@@ -80,7 +80,10 @@ def load_topic_map(
     """
     path = locate("map", MAPS, name_or_path)
     source = f"map {path.stem}"
-    file = checked(read_toml(path, "map"), _File, source)
+    tree = read_toml(path, "map")
+    if "columns" in tree:
+        raise UsageError(f"{source}: maps the columns of a CSV recording; take it to: abreast import csv")
+    file = checked(tree, _File, source)
     poses = (file.topics.leader_pose, file.topics.follower_pose)
     if file.topics.rigid_bodies is None and None in poses:
         raise UsageError(f"{source}: topics: give rigid_bodies, or both of leader_pose and follower_pose")

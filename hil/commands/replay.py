@@ -65,6 +65,10 @@ def command(
         summary["parity"] = parity_json(played)
     _write(evidence, summary, table, out)
     print_summary(summary)
+    if verify and (unrecorded := sum(parity.unrecorded for parity in played.parity.values())):
+        click.echo(
+            f"{unrecorded} commands to the robot are not in the log: the recorder missed them", err=True
+        )
     if as_json:
         print_json(summary)
     if verify and (reason := why_not_same(given, played)):

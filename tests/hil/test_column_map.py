@@ -73,6 +73,7 @@ def test_every_shipped_map_is_one_and_is_found_by_its_name() -> None:
             BODY.replace("rho", "leader_x").replace("alpha2", "leader_y"),
             r"follower_theta, follower_x, follower_y",
         ),
+        ("[topics]", r"map lab: maps the topics of a log; take it to: abreast replay"),
         (BODY, r"range and bearing need the body front end; set scenario\.estimator\.front_end = 'body'"),
         ('inputs = "guessed"\n' + BODY + SCENARIO, r"inputs is 'guessed'"),
         ('delimiter = "tab"\n' + BODY + SCENARIO, r"delimiter is 'tab', expected one character"),

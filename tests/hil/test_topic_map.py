@@ -44,6 +44,10 @@ leader = {{ name = "first", program = {{ kind = "constant", v = 0.1 }} }}
         (TOPICS + "pair_within_s = -1", r"topics.pair_within_s is -1: expected float >= 0"),
         (TOPICS + '[scenario]\nbase = "turtlebot4"', r"'turtlebot4': .* did you mean 'turtlebot3'"),
         (TOPICS + "[scenario.estimator]\nsigma = 1", r"map lab: scenario: \[estimator\] has an unknown key"),
+        (
+            TOPICS + "[columns]",
+            r"map lab: maps the columns of a CSV recording; take it to: abreast import csv",
+        ),
         ("[topics", r"map .*lab.toml: not readable as TOML"),
     ],
 )
