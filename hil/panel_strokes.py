@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from estimation.bound_check import ROUNDING
 from formation.angles import FloatArray
 
-LIMIT = "#b03030"
+BELIEVED, LIMIT = "#2a8f4c", "#b03030"
 LONGEST_LINE = 0.5
 """Between samples that are further apart [s] no line is drawn."""
 
@@ -21,6 +21,13 @@ def draw_bounds(axes: Axes, t: FloatArray, low: FloatArray, high: FloatArray, su
     label = "extended bound" if suffix else "bound"
     for index, side in enumerate((low, high)):
         axes.plot(*with_gaps(t, side), color=LIMIT, lw=0.9, alpha=0.8, label=label if index == 0 else None)
+
+
+def fill_band(axes: Axes, t: FloatArray, centre: FloatArray, reach: FloatArray) -> None:
+    """Fill three standard deviations, the ``reach``, to both sides of an estimate."""
+    moments, low = with_gaps(t, centre - reach)
+    _, high = with_gaps(t, centre + reach)
+    axes.fill_between(moments, low, high, color=BELIEVED, alpha=0.2, lw=0, label=r"$3\sigma$")
 
 
 def mark_violations(

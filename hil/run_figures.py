@@ -107,7 +107,14 @@ def _draw_stack(rows: list[Axes], stack: list[Panel], shown: Shown) -> None:
         low, high = axes.get_ylim()
         axes.set_ylim(low, high + 0.22 * (high - low))
         axes.legend(
-            loc="upper right", ncols=5, frameon=False, fontsize=8, borderaxespad=0.1, handlelength=1.4
+            loc="upper right",
+            ncols=5,
+            fontsize=8,
+            handlelength=1.4,
+            borderpad=0.15,
+            borderaxespad=0.25,
+            framealpha=0.75,
+            edgecolor="none",
         )
     rows[-1].set_xlabel("t [s]")
     for axes in rows:

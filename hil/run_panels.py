@@ -18,11 +18,20 @@ from hil.evidence import Evidence
 from hil.evidence_columns import Columns, EstimateColumns
 from hil.judge_bounds import named_bounds, worst_errors
 from hil.noise_free_orbit import NoiseFreeOrbit
-from hil.panel_strokes import LIMIT, broken_at_jumps, draw_bounds, limit_to, mark_violations, with_gaps
+from hil.panel_strokes import (
+    BELIEVED,
+    LIMIT,
+    broken_at_jumps,
+    draw_bounds,
+    fill_band,
+    limit_to,
+    mark_violations,
+    with_gaps,
+)
 from hil.robot_drawing import FOLLOWER
 from hil.true_states import Stamps, TrueStates
 
-TRUE, BELIEVED, ORBIT, BAND = "#3c3c3c", "#2a8f4c", "#7a5fa8", "#2a8f4c"
+TRUE, ORBIT = "#3c3c3c", "#7a5fa8"
 _FARTHEST = 4.0
 """A bound that is so many times out of the picture is left out: it would flatten the rest."""
 
@@ -88,7 +97,7 @@ def draw_v1(axes: Axes, shown: Shown) -> None:
     """Leader's speed: estimate with three standard deviations, truth, and bound where it is judged."""
     columns, seen = shown.columns, shown.tracked.seen
     t, v1, sd = shown.seconds(shown.tracked.capture_ns), np.asarray(seen.v1), shown.tracked.sd[:, 2]
-    axes.fill_between(t, v1 - 3.0 * sd, v1 + 3.0 * sd, color=BAND, alpha=0.2, lw=0, label=r"$3\sigma$")
+    fill_band(axes, t, v1, 3.0 * sd)
     axes.plot(*with_gaps(t, v1), color=BELIEVED, lw=0.9, label="estimate")
     if np.any(np.isfinite(columns.truth.v1)):
         axes.plot(
@@ -110,7 +119,7 @@ def draw_alpha1_error(axes: Axes, shown: Shown) -> None:
     columns = shown.columns
     t, sd = shown.seconds(shown.tracked.capture_ns), shown.tracked.sd[:, QUANTITIES.index("alpha1")]
     error = wrap(np.asarray(shown.tracked.seen.alpha1) - shown.tracked_true.alpha1)
-    axes.fill_between(t, -3.0 * sd, 3.0 * sd, color=BAND, alpha=0.2, lw=0, label=r"$3\sigma$")
+    fill_band(axes, t, np.zeros(len(t)), 3.0 * sd)
     axes.plot(*with_gaps(t, error), color=BELIEVED, lw=0.9, label="error")
     reach = 4.0 * float(np.median(sd))
     judged = shown.seconds(columns.samples.capture_ns)
@@ -130,7 +139,7 @@ def draw_alpha1_error(axes: Axes, shown: Shown) -> None:
 def draw_u1(axes: Axes, shown: Shown) -> None:
     """Leader's turn rate: estimate with three standard deviations, and truth."""
     t, u1, sd = shown.seconds(shown.tracked.capture_ns), shown.tracked.u1, shown.tracked.sd[:, 4]
-    axes.fill_between(t, u1 - 3.0 * sd, u1 + 3.0 * sd, color=BAND, alpha=0.2, lw=0, label=r"$3\sigma$")
+    fill_band(axes, t, u1, 3.0 * sd)
     axes.plot(*with_gaps(t, u1), color=BELIEVED, lw=0.9, label="estimate")
     truth = shown.columns.truth
     if np.any(np.isfinite(truth.u1)):

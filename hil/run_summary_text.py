@@ -18,6 +18,9 @@ NIS_RANGE = (1.0, 3.0)
 """Where the mean NIS of a filter is that knows its noise; 2 is the mean for a position in the plane."""
 LOST_SHARE = 0.01
 SATURATED_SHARE = 0.5
+STOPPED_SHARE = 0.02
+OFF_SHARE = 0.25
+"""A pair that is further off the noise-free run than this share of its least distance is not in formation."""
 
 
 def print_summary(summary: Mapping[str, Any], console: Console | None = None) -> None:
@@ -33,7 +36,7 @@ def print_summary(summary: Mapping[str, Any], console: Console | None = None) ->
 
 def warnings_of(summary: Mapping[str, Any]) -> list[str]:
     """What deserves a second look, in plain words."""
-    return [*_estimation_warnings(summary), *_wire_warnings(summary)]
+    return [*_estimation_warnings(summary), *_formation_warnings(summary), *_wire_warnings(summary)]
 
 
 def _lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
@@ -125,8 +128,20 @@ def _estimation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
         yield f"bound {name} does not hold in {count} samples: check the noise and leader limits it rests on"
 
 
+def _formation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
+    formation, commands = summary.get("formation", {}), summary.get("commands", {})
+    off = formation.get("orbit_deviation_rms", {}).get("rho", 0.0)
+    if off > OFF_SHARE * formation.get("rho_min", math.inf):
+        yield f"the formation is not kept: the distance is {off:.2g} m RMS off the noise-free run"
+    sent = commands.get("sent", 0)
+    if commands.get("stopped", 0) > STOPPED_SHARE * sent:
+        yield f"in {commands['stopped'] / sent:.0%} of the commands the robot was told to stand still"
+    if commands.get("saturated", 0) > SATURATED_SHARE * sent:
+        yield f"{commands['saturated'] / sent:.0%} of the commands were at a limit of the robot"
+
+
 def _wire_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
-    frames, commands = summary.get("frames", {}), summary.get("commands", {})
+    frames = summary.get("frames", {})
     lost, published = frames.get("lost", 0), frames.get("published", 0)
     if lost > LOST_SHARE * published:
         yield f"{lost / published:.1%} of the frames never reached the estimator"
@@ -134,6 +149,3 @@ def _wire_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     if rejected:
         causes = ", ".join(f"{cause.replace('_', ' ')} {count}" for cause, count in sorted(rejected.items()))
         yield f"inputs refused: {causes}"
-    sent = commands.get("sent", 0)
-    if sent and commands["saturated"] > SATURATED_SHARE * sent:
-        yield f"{commands['saturated'] / sent:.0%} of the commands were at a limit of the robot"

@@ -126,6 +126,8 @@ def test_no_line_is_drawn_across_a_gap(axes: Axes, exact_evidence: Evidence) -> 
     draw_v1(axes, shown(replace(exact_evidence, estimates=silent)))
     line = next(line for line in axes.lines if line.get_label() == "estimate")
     assert np.count_nonzero(np.isnan(np.asarray(line.get_ydata(), dtype=float))) == 1
+    (band,) = axes.collections
+    assert len(band.get_paths()) == 2
 
 
 def test_limits_of_a_command_show_where_they_matter(axes: Axes, exact_evidence: Evidence) -> None:

@@ -45,6 +45,12 @@ def test_a_good_run_is_told_without_warnings(summary: dict[str, Any]) -> None:
         ("bounds", {"violations": {"v1": 5, "v1_extended": 3}}, "v1_extended does not hold in 3 samples"),
         ("frames", {"lost": 24, "published": 240}, "10.0% of the frames never reached"),
         ("commands", {"saturated": 200, "sent": 240}, "83% of the commands were at a limit"),
+        (
+            "commands",
+            {"stopped": 24, "sent": 240},
+            "in 10% of the commands the robot was told to stand still",
+        ),
+        ("formation", {"orbit_deviation_rms": {"rho": 0.3}}, "the distance is 0.3 m RMS off"),
         ("rejected", {"not_finite": 3, "gated": 1}, "inputs refused: gated 1, not finite 3"),
     ],
 )
