@@ -43,6 +43,7 @@ from hil.topics import topics_of
 NAME = "estimator"
 _TICK_NS = 50_000_000
 _DIAGNOSTICS_NS = 500_000_000
+_SAME_PLACE = 1e-3  # two robots whose centres are this close [m] are one body under two names
 _HISTORY = 2.0  # seconds of own motion kept, enough for the latest frame that the ring can take
 
 REASONS = {
@@ -145,7 +146,7 @@ class EstimatorNode:
         if frame.strangers:
             state = replace(state, refused=counted(state.refused, "unknown_body"))
         leader, follower = frame.leader, frame.follower
-        if math.dist(leader, (follower.x, follower.y)) == 0.0:
+        if math.dist(leader, (follower.x, follower.y)) < _SAME_PLACE:
             raise RefusedError("same_place")
         motion = follower_motion(state.history, frame.capture_ns, self.trust)
         measure = measure_world if self.front_end is FrontEnd.WORLD else measure_body_from_mocap

@@ -15,6 +15,12 @@ from hil.messages import MalformedPayloadError, decode_as, to_ns
 CLOCK_TOLERANCE_NS = 50_000_000
 """How far in the future a stamp may lie before it is refused: more than this is a wrong clock."""
 
+FARTHEST = 1e4
+"""Largest coordinate or range [m] that is believed; beyond it the squares of a filter lose their meaning."""
+
+FASTEST = 1e3
+"""Largest speed [m/s] and turn rate [rad/s] of a robot that is believed."""
+
 M = TypeVar("M", bound=msg.Message)
 
 _UNIT_TOLERANCE = 0.01
@@ -53,7 +59,8 @@ def read_frame(payload: bytes, leader: str, follower: str, now_ns: int) -> Frame
     """Decode and check a mocap frame.
 
     Raises :class:`RefusedError` by cause: malformed, bad_stamp, unknown_body (it holds strangers only),
-    missing_leader, missing_follower, duplicate_body, not_finite, bad_quaternion, tilted (z is not up).
+    missing_leader, missing_follower, duplicate_body, not_finite, out_of_range, bad_quaternion, tilted (z is
+    not up).
     """
     message = _decode(payload, msg.RigidBodies)
     capture_ns = _stamp(message.header, now_ns)
@@ -79,24 +86,23 @@ def read_frame(payload: bytes, leader: str, follower: str, now_ns: int) -> Frame
 def read_odometry(payload: bytes, now_ns: int) -> MotionSample:
     """Decode and check a robot's own motion.
 
-    Raises :class:`RefusedError` by cause: malformed, bad_stamp, not_finite.
+    Raises :class:`RefusedError` by cause: malformed, bad_stamp, not_finite, out_of_range.
     """
     message = _decode(payload, msg.Odometry)
     twist = message.twist.twist
     v, u = twist.linear.x, twist.angular.z
-    if not (math.isfinite(v) and math.isfinite(u)):
-        raise RefusedError("not_finite")
+    _within(FASTEST, v, u)
     return MotionSample(_stamp(message.header, now_ns), v, u)
 
 
 def read_sighting(payload: bytes, now_ns: int) -> Sighting:
     """Decode and check a sighting of the leader.
 
-    Raises :class:`RefusedError` by cause: malformed, bad_stamp, not_finite, bad_range (not above zero).
+    Raises :class:`RefusedError` by cause: malformed, bad_stamp, not_finite, out_of_range, bad_range (not
+    above zero).
     """
     message = _decode(payload, msg.RangeBearing)
-    if not (math.isfinite(message.rho) and math.isfinite(message.alpha2)):
-        raise RefusedError("not_finite")
+    _within(FARTHEST, message.rho, message.alpha2)
     if message.rho <= 0.0:
         raise RefusedError("bad_range")
     return Sighting(_stamp(message.header, now_ns), message.rho, message.alpha2)
@@ -119,12 +125,17 @@ def _stamp(header: msg.Header, now_ns: int) -> int:
     return stamp_ns
 
 
+def _within(bound: float, *values: float) -> None:
+    if not all(map(math.isfinite, values)):
+        raise RefusedError("not_finite")
+    if max(map(abs, values)) > bound:
+        raise RefusedError("out_of_range")
+
+
 def _planar(pose: msg.Pose) -> Pose:
     """Ground pose of a body with z up; the heading is the yaw of its x axis."""
     p, q = pose.position, pose.orientation
-    values = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
-    if not all(map(math.isfinite, values)):
-        raise RefusedError("not_finite")
+    _within(FARTHEST, p.x, p.y, p.z, q.x, q.y, q.z, q.w)
     norm = math.sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
     if abs(norm - 1.0) > _UNIT_TOLERANCE:
         raise RefusedError("bad_quaternion")
