@@ -72,7 +72,7 @@ class EmulatorNode:
         )
         self.noise = MocapNoise(mocap.sigma_position, mocap.sigma_heading, mocap.static_fraction)
         self.delivery = Delivery(mocap.latency_s, mocap.jitter_s, mocap.loss)
-        self._handlers: dict[str, Callable[[EmulatorState, bytes], EmulatorState]] = {
+        self._handlers: dict[str, Callable[[EmulatorState, bytes, int], EmulatorState]] = {
             self.topics.cmd_vel: self._on_command,
             topics.STOP: self._on_stop,
             topics.DIAGNOSTICS: self._on_diagnostics,
@@ -92,22 +92,28 @@ class EmulatorNode:
     def step(
         self, state: EmulatorState, event: Event, now_ns: int
     ) -> tuple[EmulatorState, tuple[Outgoing, ...]]:
-        """Let the world go on to ``now_ns``, then take in a command, a stop or a report."""
+        """Let the world go on to ``now_ns``, then take in a command, a stop or a report.
+
+        The robots move from one thing that matters to them to the next, so that it makes no difference how
+        often a node is called in between.
+        """
         state, out = self._catch_up(state, now_ns)
         handler = self._handlers.get(event.topic)
         if handler is None:
             return state, out
         try:
-            return handler(state, event.payload), out
+            return handler(state, event.payload, now_ns), out
         except MalformedPayloadError:
             return replace(state, refused=counted(state.refused, "malformed")), out
 
-    def _on_command(self, state: EmulatorState, payload: bytes) -> EmulatorState:
+    def _on_command(self, state: EmulatorState, payload: bytes, now_ns: int) -> EmulatorState:
         wanted = STANDSTILL if state.stopped else read_drive(payload, stamped=self.topics.stamped)
+        state = self._move(state, now_ns)
         follower = state.follower.told(self.actuators.accept(wanted))
         return replace(state, follower=follower, commanded=True)
 
-    def _on_stop(self, state: EmulatorState, payload: bytes) -> EmulatorState:
+    def _on_stop(self, state: EmulatorState, payload: bytes, now_ns: int) -> EmulatorState:
+        state = self._move(state, now_ns)
         return replace(
             state,
             stopped=True,
@@ -115,7 +121,7 @@ class EmulatorNode:
             follower=state.follower.told(STANDSTILL),
         )
 
-    def _on_diagnostics(self, state: EmulatorState, payload: bytes) -> EmulatorState:
+    def _on_diagnostics(self, state: EmulatorState, payload: bytes, now_ns: int) -> EmulatorState:
         report = decode_as(payload, msg.DiagnosticArray)
         well = {status.name.removeprefix("abreast/") for status in report.status if status.level == 0}
         return replace(state, alive=state.alive | (well & self.needs))
@@ -131,7 +137,7 @@ class EmulatorNode:
                 state = self._sample_odometry(self._move(state, due_ns), out)
             else:
                 state = self._capture(self._move(state, due_ns), out)
-        return self._move(state, now_ns), tuple(out)
+        return state, tuple(out)
 
     def _move(self, state: EmulatorState, until_ns: int) -> EmulatorState:
         dt = (until_ns - state.time_ns) * _NS
