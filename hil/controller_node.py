@@ -16,6 +16,7 @@ from formation.pose import Motion
 from hil import message_types as msg
 from hil import topics
 from hil.estimate_message import from_message
+from hil.intake import CLOCK_TOLERANCE_NS
 from hil.messages import MalformedPayloadError, decode_as, header, to_time
 from hil.node import (
     Counts,
@@ -36,6 +37,7 @@ from hil.twist_wire import drive_message, read_drive
 NAME = "controller"
 _DIAGNOSTICS_NS = 500_000_000
 _NS = 1e-9
+_LARGEST = 1e6
 
 
 class ControllerState(Struct, frozen=True):
@@ -100,6 +102,8 @@ class ControllerNode:
                 estimate = from_message(decode_as(event.payload, msg.LeaderEstimate))
             except (MalformedPayloadError, ValueError):
                 return replace(state, refused=counted(state.refused, "malformed")), ()
+            if not estimate.measured_ns <= estimate.capture_ns <= now_ns + CLOCK_TOLERANCE_NS:
+                return replace(state, refused=counted(state.refused, "bad_stamp")), ()
             fresh = estimate.status is Status.TRACKING
             kept = estimate if fresh else state.estimate
             state = replace(state, status=estimate.status, heard=True, estimate=kept)
@@ -125,7 +129,7 @@ class ControllerNode:
         receipts = state.receipts
         state = replace(
             state,
-            sent=_recent((*state.sent, acting), state.estimate),
+            sent=self._recent((*state.sent, acting), state.estimate, now_ns),
             receipts=(),
             decided=counted(state.decided, decision.stop.value if decision.stop else "driving"),
             next_tick_ns=now_ns + self.tick_ns,
@@ -139,7 +143,7 @@ class ControllerNode:
         if estimate is not None:
             age = (now_ns - estimate.measured_ns) * _NS
             u1 = state.leader_u1 if self.needs_u1 else estimate.u1
-            if age <= self.max_age:
+            if age <= self.max_age and _can_be(estimate):
                 shape = predict_shape(estimate, state.sent, now_ns + self.ahead_ns, self.lag)
                 wanted = self.law(shape, estimate.v1, u1, self.gains, self.limits)
             else:
@@ -153,6 +157,21 @@ class ControllerNode:
             lost=state.status is Status.LOST,
             stopped=state.stopped,
         )
+
+    def _recent(
+        self, sent: tuple[SentCommand, ...], estimate: Estimate | None, now_ns: int
+    ) -> tuple[SentCommand, ...]:
+        """Commands that a prediction may still need: the one that acts at its begin, and later ones.
+
+        None begins before the capture of the estimate, or more than the largest age ago.
+        """
+        if estimate is None:
+            return sent[-1:]
+        begin_ns = max(estimate.capture_ns, now_ns - round(self.max_age / _NS))
+        first = 0
+        while first + 1 < len(sent) and sent[first + 1].from_ns <= begin_ns:
+            first += 1
+        return sent[first:]
 
     def _messages(
         self,
@@ -199,11 +218,16 @@ class ControllerNode:
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
 
 
-def _recent(sent: tuple[SentCommand, ...], estimate: Estimate | None) -> tuple[SentCommand, ...]:
-    """Commands that a prediction from the estimate needs: the last before its capture, and later ones."""
-    if estimate is None:
-        return sent[-1:]
-    first = 0
-    while first + 1 < len(sent) and sent[first + 1].from_ns <= estimate.capture_ns:
-        first += 1
-    return sent[first:]
+def _can_be(estimate: Estimate) -> bool:
+    """Whether every number that the law and the prediction rest on is one that a sound estimator gives."""
+    numbers = (
+        estimate.rho,
+        estimate.alpha2,
+        estimate.v1,
+        estimate.alpha1,
+        estimate.u1,
+        estimate.v2,
+        estimate.u2,
+    )
+    # NaN is not below the largest, and infinity neither.
+    return estimate.rho > 0.0 and all(abs(number) < _LARGEST for number in numbers)
