@@ -112,18 +112,26 @@ class Ending:
 
 
 def run_daemon(
-    worker: Worker, names: Topics, endpoints: Endpoints, ending: Ending, duration_s: float | None = None
+    make_worker: Callable[[], Worker],
+    names: Topics,
+    endpoints: Endpoints,
+    ending: Ending,
+    duration_s: float | None = None,
+    on_ready: Callable[[], None] = lambda: None,
 ) -> None:
     """Run a worker on the wire until the end is asked for or ``duration_s`` is over.
 
-    Events are taken one at a time in order of arrival; ``now`` is the host clock when one is taken.
+    The worker is made once the wire is there; ``on_ready`` is called when it is subscribed. Events are taken
+    one at a time in order of arrival; ``now`` is the host clock when one is taken.
     """
     session = open_session(endpoints, give_up=lambda: ending.asked)
     wire = Wire(session, urgent=(names.cmd_vel, topics.STOP))
     try:
         ending.notify(wire.wake)
+        worker = make_worker()
         worker.begin(time.time_ns())
         wire.subscribe(worker.subscribes)
+        on_ready()
         until = None if duration_s is None else time.monotonic() + duration_s
         while not ending.asked and (until is None or time.monotonic() < until):
             wait = min((worker.due_ns() - time.time_ns()) * 1e-9, _LONGEST_WAIT)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import socket
 import threading
 import time
@@ -14,6 +15,7 @@ import zenoh
 
 from hil.errors import AbreastError, UsageError
 
+_ENDPOINT = re.compile(r"[a-z][a-z0-9_-]*/\S+")
 _RETRY_S = 0.2
 _CLOSE_S = 2.0
 
@@ -22,12 +24,20 @@ _CLOSE_S = 2.0
 class Endpoints:
     """Where a session connects to and listens, such as ``tcp/192.0.2.7:7447``; or a Zenoh config file.
 
-    A session that listens is a router: others connect to it. One that only connects is a client.
+    A session that listens is a router: others connect to it. One that only connects is a client. Raises
+    :class:`UsageError` for an endpoint that is not written as protocol/address.
     """
 
     connect: str | None = None
     listen: str | None = None
     config_file: Path | None = None
+
+    def __post_init__(self) -> None:
+        for endpoint in (self.connect, self.listen):
+            if endpoint is not None and not _ENDPOINT.fullmatch(endpoint):
+                raise UsageError(
+                    f"endpoint {endpoint!r}: expected protocol/address, such as tcp/127.0.0.1:7447"
+                )
 
     def describe(self) -> str:
         """The endpoints in words."""

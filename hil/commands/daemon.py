@@ -38,9 +38,20 @@ def daemon_command(name: str, summary: str) -> click.Command:
         if not (connect or listen or zenoh_config):
             connect = DEFAULT_ENDPOINT
         chosen = load_scenario(scenario, overrides)
-        worker = _WORKERS[name](chosen, out, frozenset(filter(None, needs.split(","))))
-        click.echo(f"abreast {name}: {chosen.name}, on {connect or listen or zenoh_config}", err=True)
-        run_daemon(worker, topics_of(chosen), Endpoints(connect, listen, zenoh_config), ending, duration)
+        needed = frozenset(filter(None, needs.split(",")))
+        endpoints = Endpoints(connect, listen, zenoh_config)
+
+        def say_ready() -> None:
+            click.echo(f"abreast {name}: ready, {chosen.name} on {endpoints.describe()}", err=True)
+
+        run_daemon(
+            lambda: _WORKERS[name](chosen, out, needed),
+            topics_of(chosen),
+            endpoints,
+            ending,
+            duration,
+            say_ready,
+        )
 
     path = click.Path(path_type=Path, dir_okay=False)
     positive = click.FloatRange(min=0, min_open=True)

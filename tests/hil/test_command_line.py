@@ -1,0 +1,81 @@
+"""The console script: exit codes, one line per mistake, one JSON object on stdout."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hil.command_line import COMMANDS, main
+
+
+def abreast(*arguments: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "hil", *arguments], capture_output=True, text=True, cwd=folder, timeout=120
+    )
+
+
+def test_help_names_every_command() -> None:
+    result = abreast("--help")
+    assert result.returncode == 0
+    assert all(f"  {name} " in result.stdout for name in COMMANDS)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["rnu"], "rnu"),
+        (["run", "--speed", "3"], "--speed"),
+        (["run", "turtelbot3"], "did you mean 'turtlebot3'"),
+        (["run", "--set", "mocap.los=0.1"], "did you mean 'loss'"),
+        (["run", "--set", "mocap.rate_hz=-5"], "mocap.rate_hz"),
+        (["run", "--set", "mocap.rate_hz=often"], "mocap.rate_hz"),
+        (["run", "--set", "formation.rho_0=0"], "formation.rho_0"),
+        (["run", "--estimator", "kalman"], "estimator.kind"),
+        (["run", "--duration", "-3"], "--duration"),
+        (["estimator", "turtlebot3", "--listen", "nonsense"], "nonsense"),
+        (["recorder", "turtlebot3"], "--out"),
+        (["replay", "no_such.mcap"], "no_such.mcap"),
+        (["simulate", "turtlebot3", "--law", "clever"], "controller.law"),
+    ],
+)
+def test_a_mistake_gives_exit_code_2_and_one_line(
+    arguments: list[str],
+    said: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    printed = capsys.readouterr()
+    assert ended.value.code == 2
+    assert printed.out == ""
+    assert len(printed.err.strip().splitlines()) == 1
+    assert said in printed.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nobody_at_the_endpoint_is_said_in_one_line(tmp_path: Path) -> None:
+    result = abreast("controller", "turtlebot3", "--connect", "tcp/127.0.0.1:1", folder=tmp_path)
+    assert result.returncode == 1
+    assert "tcp/127.0.0.1:1" in result.stderr.strip().splitlines()[-1]
+    assert "Traceback" not in result.stderr
+
+
+def test_a_lockstep_run_prints_one_json_object_and_leaves_its_files(tmp_path: Path) -> None:
+    arguments = ["run", "--lockstep", "--duration", "6", "--seed", "7", "--json"]
+    first = abreast(*arguments, "--out", "a", folder=tmp_path)
+    again = abreast(*arguments, "--out", "b", folder=tmp_path)
+    assert first.returncode == again.returncode == 0, first.stderr
+    summary = json.loads(first.stdout)
+    assert (summary["scenario"], summary["seed"], summary["mode"]) == ("turtlebot3", 7, "lockstep")
+    assert (tmp_path / "a" / "run.mcap").read_bytes() == (tmp_path / "b" / "run.mcap").read_bytes()
+    assert json.loads((tmp_path / "a" / "summary.json").read_text())["frames"] == summary["frames"]
+    refused = abreast(*arguments, "--out", "a", folder=tmp_path)
+    assert refused.returncode == 2
+    assert "run.mcap exists already" in refused.stderr
