@@ -32,6 +32,7 @@ front_end = "body"
 [scenario.run]
 evaluate_from_s = 102.0
 """
+FOLLOWER_AT_ORIGIN = {"follower_x": 0, "follower_y": 0, "follower_theta": 0}
 TOPICS = '[topics]\nrigid_bodies = "rigid_bodies"\nodometry = "follower/odom"\n'
 
 
@@ -159,6 +160,21 @@ def test_an_imported_recording_keeps_its_own_time(abreast: Any, imported: Path, 
     # Seen to stand still at the side of a robot that drives straight, the leader drives as fast.
     assert float(rows(table)[-1]["v1"]) == pytest.approx(0.1, abs=0.005)
     assert summary(abreast("replay", imported, "--json"))["estimation"]["evaluated_from_s"] == 102.0
+
+
+def test_strict_fails_where_an_error_is_outside_its_extended_bound(abreast: Any, tmp_path: Path) -> None:
+    """A truth that claims 2 m/s of a leader seen at 0.1 m/s is further off than any bound allows."""
+    (tmp_path / "lab.csv").write_text(TABLE)
+    poses = {"leader_x": 0, "leader_y": 0.2, "leader_theta": 0, **FOLLOWER_AT_ORIGIN}
+    claims = "".join(f"{name} = {{ constant = {value} }}\n" for name, value in {**poses, "v1": 2.0}.items())
+    (tmp_path / "lab.toml").write_text(COLUMNS.replace('v1 = "v"\n', claims))
+    log = tmp_path / "lab.mcap"
+    abreast("import", "csv", tmp_path / "lab.csv", "--map", tmp_path / "lab.toml", "--out", log)
+    loose, strict = abreast("replay", log, "--json"), abreast("replay", log, "--strict", "--json")
+    assert (loose.code, strict.code) == (0, 1)
+    assert summary(loose) == summary(strict)
+    assert summary(strict)["bounds"]["violations"]["v1_extended"] > 0
+    assert "extended bounds violated (samples): v1_extended by" in strict.err
 
 
 def test_a_map_makes_a_log_of_another_make_replay(abreast: Any, run_log: Path, tmp_path: Path) -> None:
