@@ -18,7 +18,7 @@ from hil.messages import to_ns
 from hil.true_states import Stamps, TrueStates
 
 _SEEN = ("rho", "alpha2", "rho_dot", "alpha2_dot", "v1", "alpha1", "v2", "u2")
-_ESTIMATED = attrgetter(*_SEEN, "u1", "nis", "bound_v1", "bound_alpha1")
+_ESTIMATED = attrgetter(*_SEEN, "u1", "nis")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,14 +33,12 @@ class EstimateColumns:
     seen: Perceived
     u1: FloatArray
     nis: FloatArray
-    bound_v1: FloatArray
-    bound_alpha1: FloatArray
     sd: FloatArray
 
     @staticmethod
     def of(estimates: Sequence[LeaderEstimate]) -> EstimateColumns:
         """Columns of messages, in their order."""
-        columns = np.array(list(map(_ESTIMATED, estimates)), dtype=np.float64).reshape(-1, 12).T
+        columns = np.array(list(map(_ESTIMATED, estimates)), dtype=np.float64).reshape(-1, 10).T
         variances = np.array([e.covariance[::6] for e in estimates], dtype=np.float64).reshape(-1, 5)
         return EstimateColumns(
             capture_ns=np.array([to_ns(e.header.stamp) for e in estimates], dtype=np.int64),
@@ -48,8 +46,6 @@ class EstimateColumns:
             seen=Perceived(*columns[:8]),
             u1=columns[8],
             nis=columns[9],
-            bound_v1=columns[10],
-            bound_alpha1=columns[11],
             sd=np.sqrt(np.maximum(variances, 0.0)),
         )
 
@@ -62,8 +58,6 @@ class EstimateColumns:
             seen=seen,
             u1=self.u1[rows],
             nis=self.nis[rows],
-            bound_v1=self.bound_v1[rows],
-            bound_alpha1=self.bound_alpha1[rows],
             sd=self.sd[rows],
         )
 
@@ -111,7 +105,7 @@ def columns_of(evidence: Evidence) -> Columns:
     """Columns of evidence. Samples are the estimates marked TRACKING whose capture lies in the evaluation."""
     run, span = run_span(evidence), evaluation_span(evidence)
     estimates, truth = EstimateColumns.of(evidence.estimates), TrueStates.of(evidence.truth)
-    judged = (estimates.capture_ns >= span.from_ns) & (estimates.capture_ns <= span.to_ns)
+    judged = inside(estimates.capture_ns, span)
     samples = estimates.only(judged & (estimates.status == Status.TRACKING))
     return Columns(
         run=run,
@@ -122,3 +116,8 @@ def columns_of(evidence: Evidence) -> Columns:
         samples=samples,
         true=truth.at(samples.capture_ns),
     )
+
+
+def inside(moments_ns: Stamps, span: Span) -> NDArray[np.bool_]:
+    """Which moments lie within a span, its ends included."""
+    return (moments_ns >= span.from_ns) & (moments_ns <= span.to_ns)

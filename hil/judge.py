@@ -16,8 +16,6 @@ from hil.judge_formation import judge_formation
 from hil.report_json import known
 
 _STRANGERS = "unknown_body"
-
-
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "max": 100.0}
 
 

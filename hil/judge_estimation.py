@@ -14,8 +14,8 @@ from estimation.measurement import FrontEnd, PoseNoise
 from estimation.motion import LeaderLimits, ProcessNoise
 from estimation.tracking import Status
 from formation.angles import FloatArray, wrap
-from hil.evidence import Evidence
-from hil.evidence_columns import Columns
+from hil.evidence import Evidence, Span
+from hil.evidence_columns import Columns, inside
 from hil.scenario import Scenario
 
 WARM_UP_NS = 3_000_000_000
@@ -34,22 +34,16 @@ def judge_estimation(evidence: Evidence, columns: Columns) -> dict[str, object]:
     the samples at which the quantity's truth is known. ``efficiency``: RMSE over the root mean square of the
     posterior Cramer-Rao bound at these samples; only for the world front end, whose noise it is about.
     """
-    samples, run = columns.samples, columns.run
-    since = columns.estimates.capture_ns >= run.from_ns
-    settled = np.flatnonzero(since & (columns.estimates.status == Status.TRACKING))
+    samples, estimates = columns.samples, columns.estimates
     nis = samples.nis[np.isfinite(samples.nis)]
-    judged = (columns.estimates.capture_ns >= columns.span.from_ns) & (
-        columns.estimates.capture_ns <= columns.span.to_ns
-    )
+    judged = int(np.count_nonzero(inside(estimates.capture_ns, columns.span)))
     errors = estimate_errors(columns)
     rmse = {name: _rms(error) for name, error in errors.items()}
     return {
         "evaluated_from_s": (columns.span.from_ns - evidence.zero_ns) * 1e-9,
         "samples": len(samples.capture_ns),
-        "untracked": int(np.count_nonzero(judged)) - len(samples.capture_ns),
-        "settle_s": (columns.estimates.capture_ns[settled].min() - run.from_ns) * 1e-9
-        if len(settled)
-        else None,
+        "untracked": judged - len(samples.capture_ns),
+        "settle_s": _settle(columns),
         "nis_mean": float(nis.mean()) if len(nis) else None,
         "rmse": rmse,
         "max": {name: float(np.nanmax(np.abs(error))) for name, error in errors.items()},
@@ -74,6 +68,12 @@ def estimate_errors(columns: Columns) -> dict[str, FloatArray]:
     return {name: error for name, error in errors.items() if np.any(np.isfinite(error))}
 
 
+def _settle(columns: Columns) -> float | None:
+    since, estimates = columns.run.from_ns, columns.estimates
+    settled = estimates.capture_ns[(estimates.status == Status.TRACKING) & (estimates.capture_ns >= since)]
+    return float(settled.min() - since) * 1e-9 if len(settled) else None
+
+
 def _rms(error: FloatArray) -> float:
     return math.sqrt(float(np.nanmean(error * error)))
 
@@ -90,12 +90,11 @@ def _coverage(columns: Columns, errors: Mapping[str, FloatArray]) -> dict[str, f
 def _efficiency(evidence: Evidence, columns: Columns, rmse: Mapping[str, float]) -> dict[str, float]:
     given = evidence.scenario
     pose_noise, sd_v2, sd_u2 = _noise(given, emulated=evidence.motion_since_ns is not None)
-    if given.estimator.front_end != "world" or evidence.frames is None or pose_noise.position == 0.0:
-        return {}
-    if not rmse:
+    bounded = given.estimator.front_end == "world" and pose_noise.position > 0.0
+    if not bounded or evidence.frames is None or not rmse:
         return {}
     truth = columns.truth
-    near = (truth.capture_ns >= columns.span.from_ns - WARM_UP_NS) & (truth.capture_ns <= columns.span.to_ns)
+    near = inside(truth.capture_ns, Span(columns.span.from_ns - WARM_UP_NS, columns.span.to_ns))
     heading = truth.leader[near, 2]
     leader = np.column_stack(
         [

@@ -8,7 +8,7 @@ import numpy as np
 
 from formation.angles import FloatArray, wrap
 from hil.evidence import Evidence
-from hil.evidence_columns import Columns
+from hil.evidence_columns import Columns, inside
 from hil.noise_free_orbit import noise_free_orbit
 
 
@@ -18,7 +18,7 @@ def judge_formation(evidence: Evidence, columns: Columns) -> dict[str, object]:
     ``orbit_deviation_rms`` against :func:`hil.noise_free_orbit.noise_free_orbit`, for emulated runs.
     """
     truth, span = columns.truth, columns.span
-    known = (truth.capture_ns >= span.from_ns) & (truth.capture_ns <= span.to_ns) & np.isfinite(truth.rho)
+    known = inside(truth.capture_ns, span) & np.isfinite(truth.rho)
     if not np.any(known):
         return {}
     rho, alpha1, alpha2 = truth.rho[known], truth.alpha1[known], truth.alpha2[known]

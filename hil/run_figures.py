@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from hil.evidence import Evidence
-from hil.evidence_columns import columns_of
+from hil.evidence_columns import columns_of, inside
 from hil.noise_free_orbit import noise_free_orbit
 from hil.robot_drawing import draw_pair
 from hil.run_panels import Panel, Shown, panels_for
@@ -79,7 +79,7 @@ def _figure(shown: Shown) -> Figure:
 
 def _draw_tracks(axes: Axes, shown: Shown) -> None:
     truth, run = shown.columns.truth, shown.columns.run
-    during = (truth.capture_ns >= run.from_ns) & (truth.capture_ns <= run.to_ns)
+    during = inside(truth.capture_ns, run)
     draw_pair(
         axes,
         shown.seconds(truth.capture_ns[during]),
