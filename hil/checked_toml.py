@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import math
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, Literal, TypeGuard, TypeVar, get_args, get_origin
 
 import msgspec
 
@@ -37,12 +38,11 @@ def locate(noun: str, folder: str, name_or_path: str) -> Path:
 
     ``noun`` is what the messages call such a file, ``folder`` where the shipped ones are.
     """
-    shipped = data_folder() / folder / f"{name_or_path}.toml"
-    if shipped.is_file():
-        return shipped
-    path = Path(name_or_path)
-    if path.is_file():
-        return path
+    for path in (data_folder() / folder / f"{name_or_path}.toml", Path(name_or_path)):
+        # A name may be too long for the system, or hold what no path may.
+        with contextlib.suppress(OSError, ValueError):
+            if path.is_file():
+                return path
     names = shipped_names(folder)
     near = difflib.get_close_matches(name_or_path, names, n=1)
     hint = f"; did you mean {near[0]!r}?" if near else f"; give a TOML file or one of: {', '.join(names)}"
@@ -53,7 +53,7 @@ def read_toml(path: Path, noun: str) -> dict[str, Any]:
     """Tree of plain values of a TOML file; :class:`UsageError` if it isn't readable as such."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise UsageError(f"{noun} {path}: not readable as TOML ({error}); correct the file") from error
 
 
@@ -63,9 +63,11 @@ def checked(tree: Mapping[str, Any], kind: type[T], source: str) -> T:
     Raises :class:`UsageError`, beginning with ``source``, for an unknown key (naming the nearest known one),
     a wrong type, a value out of range or a number that isn't finite.
     """
-    _refuse_non_finite(tree, source, "")
     try:
+        _refuse_non_finite(tree, source, "")
         return msgspec.convert(tree, kind)
+    except RecursionError:
+        raise UsageError(f"{source}: sections nested too deeply; leave out what does not belong") from None
     except msgspec.ValidationError as error:
         raise UsageError(f"{source}: {_explain(str(error), tree, kind)}") from None
 
@@ -103,22 +105,51 @@ def _explain(error: str, tree: Mapping[str, Any], kind: type[msgspec.Struct]) ->
     for step in path.split(".") if path else []:
         value = value.get(step) if isinstance(value, Mapping) else None
     what = parts["what"].replace("`", "").replace("Expected", "expected").replace("Object missing", "missing")
+    what = what.replace("expected object, got", "expected a section, got")
+    allowed = _allowed(path, tree, kind) if what.startswith("Invalid") else []
+    if allowed:
+        what = f"expected one of {', '.join(map(repr, allowed))}"
     shown = f" is {value!r}:" if path and not isinstance(value, Mapping) and value is not None else ":"
     return f"{path or 'top level'}{shown} {what}"
 
 
-def _known_keys(section: str, tree: Mapping[str, Any], kind: Any) -> list[str]:
+def _known_keys(section: str, tree: Mapping[str, Any], kind: type[msgspec.Struct]) -> list[str]:
     """Keys that the section of the given dotted path may have."""
-    node: Any = tree
-    for step in section.split(".") if section else []:
-        node = node.get(step, {}) if isinstance(node, Mapping) else {}
-        kind = next(field.type for field in msgspec.structs.fields(kind) if field.name == step)
-        options = [
-            option
-            for option in get_args(kind)
-            if isinstance(option, type) and issubclass(option, msgspec.Struct)
-        ]
-        if options:
-            tag = node.get("kind") if isinstance(node, Mapping) else None
-            kind = next((option for option in options if option.__struct_config__.tag == tag), options[0])
-    return [field.name for field in msgspec.structs.fields(kind)]
+    node, sections = _walk(section, tree, kind)
+    tag = node.get("kind") if isinstance(node, Mapping) else None
+    sections.sort(key=lambda option: option.__struct_config__.tag != tag)
+    return [field.name for option in sections[:1] for field in msgspec.structs.fields(option)]
+
+
+def _allowed(path: str, tree: Mapping[str, Any], kind: type[msgspec.Struct]) -> list[object]:
+    """Values that the key of the given dotted path may have, where there are only so many."""
+    section, _, key = path.rpartition(".")
+    _, options = _walk(section, tree, kind)
+    tags = [o.__struct_config__.tag for o in options if o.__struct_config__.tag_field == key]
+    fields = [field for option in options for field in msgspec.structs.fields(option) if field.name == key]
+    return [*tags] or [value for field in fields for value in _literals(field.type)]
+
+
+def _walk(
+    path: str, tree: Mapping[str, Any], kind: type[msgspec.Struct]
+) -> tuple[object, list[type[msgspec.Struct]]]:
+    """Value at a dotted path, and the kinds of section that may stand there; none if it is no section."""
+    node: object = tree
+    options: list[type[msgspec.Struct]] = [kind]
+    for step in path.split(".") if path else []:
+        node = node.get(step) if isinstance(node, Mapping) else None
+        fields = [field for option in options for field in msgspec.structs.fields(option)]
+        types = [field.type for field in fields if field.name == step]
+        options = [option for given in types for option in (given, *get_args(given)) if _is_section(option)]
+    return node, options
+
+
+def _is_section(kind: object) -> TypeGuard[type[msgspec.Struct]]:
+    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
+
+
+def _literals(kind: Any) -> list[object]:
+    """Values of a Literal, or of the Literals in a union."""
+    if get_origin(kind) is Literal:
+        return list(get_args(kind))
+    return [value for option in get_args(kind) for value in _literals(option)]

@@ -65,4 +65,5 @@ def drive(robot: Robot, actuators: Actuators, dt: float) -> Robot:
 def _truncate(value: float, resolution: float) -> float:
     if resolution <= 0.0:
         return value
-    return math.trunc(value / resolution + math.copysign(_ROUNDING, value)) * resolution
+    steps = value / resolution + math.copysign(_ROUNDING, value)
+    return math.trunc(steps) * resolution if math.isfinite(steps) else value

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 Positive = Annotated[float, Meta(gt=0.0)]
+Rate = Annotated[float, Meta(ge=0.01, le=10_000.0)]
 NonNegative = Annotated[float, Meta(ge=0.0)]
 Probability = Annotated[float, Meta(ge=0.0, lt=1.0)]
 Name = Annotated[str, Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
@@ -55,7 +56,7 @@ class ControllerSection(_Section, frozen=True, kw_only=True):
     max_age_s: Positive = 0.2
     lag_s: NonNegative = 0.1
     transport_s: NonNegative = 0.0
-    tick_hz: Positive = 50.0
+    tick_hz: Rate = 50.0
     command_type: Literal["TwistStamped", "Twist"] = "TwistStamped"
 
 
@@ -121,7 +122,7 @@ class RobotSection(_Section, frozen=True, kw_only=True):
     u_max: Positive = 2.84
     v_resolution: NonNegative = 0.01
     u_resolution: NonNegative = 0.01
-    odometry_rate_hz: Positive = 30.0
+    odometry_rate_hz: Rate = 30.0
     odometry_sigma_v: NonNegative = 0.002
     odometry_sigma_u: NonNegative = 0.01
 
@@ -129,7 +130,7 @@ class RobotSection(_Section, frozen=True, kw_only=True):
 class MocapSection(_Section, frozen=True, kw_only=True):
     """The emulated motion capture: noise of a moving body, the share a standing one has, delivery."""
 
-    rate_hz: Positive = 120.0
+    rate_hz: Rate = 120.0
     sigma_position: NonNegative = 0.0003
     sigma_heading: NonNegative = 0.0035
     static_fraction: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.05

@@ -87,7 +87,7 @@ def _apply(tree: dict[str, Any], override: str) -> None:
         raise UsageError(f"--set {override!r}: expected section.key=value, for example mocap.loss=0.05")
     try:
         value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         value = text.strip()
     node: Any = tree
     for step in steps[:-1]:
