@@ -33,18 +33,26 @@ class LeaderLimits:
 class ProcessNoise:
     """Spectral densities of the leader's motion.
 
-    ``q_v`` [m^2/s^3] drives the speed, ``q_u`` [rad^2/s^3] the turn rate, ``v_eps`` [m/s] is the speed below
-    which the direction of motion is not trusted, so that the noise of w becomes isotropic.
+    ``q_v`` [m^2/s^3] drives the speed, ``q_u`` [rad^2/s^3] the turn rate. ``v_eps`` [m/s] is the speed below
+    which the direction of motion is not trusted, so that the noise of w becomes isotropic. A leader slower
+    than half of it stands or sets off, which the model of steady driving knows nothing of: there w is driven
+    by up to ``q_start`` [m^2/s^3] more.
     """
 
     q_v: float
     q_u: float
     v_eps: float
+    q_start: float = 0.0
 
     @staticmethod
     def by_rule(limits: LeaderLimits, turn_bandwidth: float) -> ProcessNoise:
-        """Noise from the leader's limits: q_v = (0.1 k_v)^2 and q_u = turn_bandwidth k_u^2 per second."""
-        return ProcessNoise((0.1 * limits.k_v) ** 2, turn_bandwidth * limits.k_u**2, limits.v_eps)
+        """Noise per second from the leader's limits.
+
+        q_v = (0.1 k_v)^2, q_u = turn_bandwidth k_u^2, and q_start = k_v^2: from rest to k_v within a second.
+        """
+        return ProcessNoise(
+            (0.1 * limits.k_v) ** 2, turn_bandwidth * limits.k_u**2, limits.v_eps, limits.k_v**2
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,9 +116,10 @@ def process_noise(mean: Vector, dt: float, noise: ProcessNoise) -> Matrix:
     (dt^2/2); white turn acceleration q_u into u1, from where the model itself carries it into w and p.
     """
     wx, wy = float(mean[2]), float(mean[3])
-    weight = noise.q_v / (wx * wx + wy * wy + noise.v_eps**2)
-    floor = noise.v_eps**2
-    xx, xy, yy = weight * (wx * wx + floor), weight * wx * wy, weight * (wy * wy + floor)
+    squared, floor = wx * wx + wy * wy, noise.v_eps**2
+    weight = noise.q_v / (squared + floor)
+    start = noise.q_start * max(0.0, 1.0 - 4.0 * squared / floor)
+    xx, xy, yy = weight * (wx * wx + floor) + start, weight * wx * wy, weight * (wy * wy + floor) + start
     q = np.zeros((STATE_SIZE, STATE_SIZE))
     along = np.array([[xx, xy], [xy, yy]])
     q[0:2, 0:2] = along * (dt**3 / 3.0)

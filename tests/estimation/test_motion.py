@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -174,8 +175,17 @@ def test_noise_drives_the_speed_and_leaves_the_direction_to_the_turn_rate() -> N
     isotropic = process_noise(np.zeros(5), 0.01, NOISE)
     assert q[2, 2] == pytest.approx(NOISE.q_v * 0.01)
     assert q[3, 3] == pytest.approx(q[2, 2] * 0.04**2 / (0.3**2 + 0.04**2))
-    assert isotropic[2, 2] == isotropic[3, 3] == pytest.approx(NOISE.q_v * 0.01)
+    assert isotropic[2, 2] == isotropic[3, 3] == pytest.approx((NOISE.q_v + NOISE.q_start) * 0.01)
     assert isotropic[2, 3] == 0.0
+
+
+def test_only_a_leader_that_stands_is_expected_to_set_off() -> None:
+    without = replace(NOISE, q_start=0.0)
+    for speed, more in ((0.0, True), (0.019, True), (0.02, False), (0.3, False)):
+        state = np.array([0.0, 0.0, 0.0, speed, 0.1])
+        added = process_noise(state, 0.01, NOISE) - process_noise(state, 0.01, without)
+        assert (added.any() > 0) == more
+        assert np.linalg.eigvalsh(added).min() >= -1e-18
 
 
 def test_no_time_adds_no_noise() -> None:
