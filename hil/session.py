@@ -16,6 +16,7 @@ import zenoh
 from hil.errors import AbreastError, UsageError
 
 _ENDPOINT = re.compile(r"[a-z][a-z0-9_-]*/\S+")
+_PRIORITIES = ("real_time", "data")
 _RETRY_S = 0.2
 _CLOSE_S = 2.0
 
@@ -92,6 +93,11 @@ def _config(endpoints: Endpoints) -> zenoh.Config:
             config.insert_json5("connect/endpoints", json.dumps([endpoints.connect]))
         config.insert_json5("scouting/multicast/enabled", "false")
         config.insert_json5("scouting/gossip/enabled", "false")
+        # By default two urgent messages may wait for a link, and a third is dropped after 1 ms: less than a
+        # recorder that is flushing its file needs, while a stalled viewer may still hold up nobody for long.
+        for priority in _PRIORITIES:
+            config.insert_json5(f"transport/link/tx/queue/size/{priority}", "16")
+        config.insert_json5("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "5000")
     except zenoh.ZError as error:
         reason = str(error).partition(" at /")[0]
         raise UsageError(
