@@ -13,8 +13,6 @@ from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 from typing import Protocol
 
-from scipy.stats import chi2
-
 from estimation.belief import Belief, Model, innovation
 from estimation.measurement import Measurement
 from estimation.motion import FollowerMotion
@@ -113,7 +111,8 @@ class Tracker:
     def __init__(self, estimator: Estimator, settings: TrackSettings) -> None:
         self.estimator = estimator
         self.settings = settings
-        self._gate = float(chi2.ppf(settings.gate_probability, df=2))
+        # With two degrees of freedom the chi-square quantile has this closed form.
+        self._gate = -2.0 * math.log1p(-settings.gate_probability)
 
     def add(self, track: Track, measurement: Measurement) -> tuple[Track, Verdict]:
         """Fold a measurement in at its place in time; return the new track and what became of it.
