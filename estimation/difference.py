@@ -75,6 +75,8 @@ class DifferenceEstimator:
         velocity += motion.sd_v2**2 * np.outer(ahead, ahead) + motion.sd_u2**2 * np.outer(across, across)
         covariance = np.zeros((5, 5))
         covariance[0:2, 0:2] = measurement.covariance
+        # The newest position is one end of the newest difference.
+        covariance[0:2, 2:4] = covariance[2:4, 0:2] = gain / dt * measurement.covariance
         covariance[2:4, 2:4] = velocity
         sideways = float(np.trace(velocity)) / 2.0 / max(v1, limits.v_eps) ** 2
         covariance[4, 4] = min(sideways * smoothed, limits.k_u**2)
