@@ -148,7 +148,9 @@ class Leaders:
 
     @staticmethod
     def unstacked(x: FloatArray) -> Leaders:
-        return Leaders(x[:, 0] + 1j * x[:, 1], x[:, 2] + 1j * x[:, 3], x[:, 4])
+        parts = np.zeros((2, len(x)), dtype=np.complex128)
+        parts.real, parts.imag = x[:, 0:4:2].T, x[:, 1:4:2].T
+        return Leaders(parts[0], parts[1], x[:, 4])
 
 
 def random_leaders(generator: np.random.Generator, runs: int, steps: int) -> FloatArray:
