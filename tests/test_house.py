@@ -1,0 +1,122 @@
+"""The rules that the house is built by: who imports whom, what is pure, what is shipped."""
+
+from __future__ import annotations
+
+import ast
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+from hatchling.builders.wheel import WheelBuilder
+
+import hil
+from hil.column_map import load_column_map
+from hil.errors import UsageError
+from hil.scenario_file import load_scenario, scenario_names
+from hil.topic_map import load_topic_map
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = {
+    "formation": {"formation"},
+    "controllers": {"controllers", "formation"},
+    "estimation": {"estimation", "formation"},
+    "hil": {"hil", "controllers", "estimation", "formation"},
+}
+"""Packages, and those of them that each may import."""
+
+PURE = ("formation", "controllers", "estimation")
+WORLDLY = {
+    "asyncio", "datetime", "io", "logging", "mcap", "msgspec", "multiprocessing", "os", "pathlib", "random",
+    "rosbags", "shutil", "socket", "subprocess", "sys", "tempfile", "threading", "time", "zenoh",
+}  # fmt: skip
+"""What no pure package may import: clocks, files, wires, processes, hidden randomness."""
+
+NAMELESS = {"common", "helper", "helpers", "manager", "misc", "util", "utils"}
+LONGEST_MODULE = 400
+MODULES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+MAPS = sorted((ROOT / "data" / "maps").glob("*.toml"))
+
+
+def imported(path: Path) -> set[str]:
+    """Top-level names of all that a module imports, wherever in it."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            names.add((node.module or "").partition(".")[0])
+    return names
+
+
+def called(path: Path) -> set[str]:
+    """Plain names that a module calls."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    calls = (node.func for node in ast.walk(tree) if isinstance(node, ast.Call))
+    return {function.id for function in calls if isinstance(function, ast.Name)}
+
+
+def named(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+@pytest.mark.parametrize("path", MODULES, ids=named)
+def test_a_module_keeps_to_its_floor(path: Path) -> None:
+    package = path.relative_to(ROOT).parts[0]
+    used = imported(path)
+    assert used & PACKAGES.keys() <= PACKAGES[package]
+    assert "tests" not in used
+    if package in PURE:
+        assert not used & WORLDLY
+        assert not called(path) & {"open", "print", "input", "exec", "eval", "__import__"}
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= LONGEST_MODULE
+    assert not set(path.stem.split("_")) & NAMELESS
+
+
+def test_there_are_no_other_packages() -> None:
+    apart = {"tests", "benchmarks"}
+    assert {path.parent.name for path in ROOT.glob("*/__init__.py")} - apart == PACKAGES.keys()
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_every_shipped_scenario_loads_and_is_described(name: str) -> None:
+    scenario = load_scenario(name)
+    assert scenario.name == name
+    assert scenario.description
+
+
+@pytest.mark.parametrize("path", MAPS, ids=named)
+def test_every_shipped_map_is_one(path: Path) -> None:
+    loaded = []
+    for load in (load_column_map, load_topic_map):
+        try:
+            loaded.append(load(path.stem))
+        except UsageError:
+            continue
+    assert len(loaded) == 1
+
+
+def project() -> dict[str, dict[str, str]]:
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        return tomllib.load(file)
+
+
+def test_the_version_is_the_same_everywhere() -> None:
+    assert hil.__version__ == project()["project"]["version"]
+
+
+def test_the_wheel_holds_the_four_packages_the_scenarios_and_the_maps(tmp_path: Path) -> None:
+    (built,) = WheelBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])
+    with zipfile.ZipFile(built) as wheel:
+        held = {name for name in wheel.namelist() if ".dist-info/" not in name}
+        records = {name.partition("/")[2] for name in wheel.namelist() if ".dist-info/" in name}
+    data = {f"hil/data/{path.parent.name}/{path.name}" for path in (ROOT / "data").glob("*/*.toml")}
+    assert {name for name in held if name.startswith("hil/data/")} == data
+    sources = {named(path) for path in MODULES} | {
+        named(path) for path in (ROOT / "hil" / "msg").rglob("*.msg")
+    }
+    assert sources <= held
+    rest = held - data - sources
+    assert {Path(name).name for name in rest} <= {"py.typed"}
+    assert {"METADATA", "RECORD", "entry_points.txt", "licenses/LICENSE"} <= records
