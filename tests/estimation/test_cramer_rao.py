@@ -148,15 +148,21 @@ class Leaders:
 
     @staticmethod
     def unstacked(x: FloatArray) -> Leaders:
-        parts = np.zeros((2, len(x)), dtype=np.complex128)
-        parts.real, parts.imag = x[:, 0:4:2].T, x[:, 1:4:2].T
-        return Leaders(parts[0], parts[1], x[:, 4])
+        return Leaders(_complex(x[:, 0], x[:, 1]), _complex(x[:, 2], x[:, 3]), x[:, 4])
+
+
+def _complex(real: FloatArray, imaginary: FloatArray) -> NDArray[np.complex128]:
+    """Put the parts together without arithmetic, whose result types differ between numpy's versions."""
+    whole = np.zeros(len(real), dtype=np.complex128)
+    whole.real, whole.imag = real, imaginary
+    return whole
 
 
 def random_leaders(generator: np.random.Generator, runs: int, steps: int) -> FloatArray:
     """True states (steps, runs, 5) of leaders that move as the model's own process noise says."""
-    heading = np.exp(1j * generator.uniform(-math.pi, math.pi, runs))
-    leaders = Leaders(np.zeros(runs, complex), 0.2 * heading, generator.uniform(-0.5, 0.5, runs))
+    heading = generator.uniform(-math.pi, math.pi, runs)
+    velocity = _complex(0.2 * np.cos(heading), 0.2 * np.sin(heading))
+    leaders = Leaders(np.zeros(runs, complex), velocity, generator.uniform(-0.5, 0.5, runs))
     states = [leaders.stacked()]
     for _ in range(steps - 1):
         shocks = np.linalg.cholesky(leaders.drive(DT)) @ generator.standard_normal((runs, 5, 1))
