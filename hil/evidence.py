@@ -88,7 +88,7 @@ class Span:
     @property
     def seconds(self) -> float:
         """Its length [s]."""
-        return (self.to_ns - self.from_ns) * 1e-9
+        return (self.to_ns - self.from_ns) / 1e9
 
 
 def run_span(evidence: Evidence) -> Span:

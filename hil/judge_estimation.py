@@ -40,7 +40,7 @@ def judge_estimation(evidence: Evidence, columns: Columns) -> dict[str, object]:
     errors = estimate_errors(columns)
     rmse = {name: _rms(error) for name, error in errors.items()}
     return {
-        "evaluated_from_s": (columns.span.from_ns - evidence.zero_ns) * 1e-9,
+        "evaluated_from_s": (columns.span.from_ns - evidence.zero_ns) / 1e9,
         "samples": len(samples.capture_ns),
         "untracked": judged - len(samples.capture_ns),
         "settle_s": _settle(columns),
@@ -71,7 +71,7 @@ def estimate_errors(columns: Columns) -> dict[str, FloatArray]:
 def _settle(columns: Columns) -> float | None:
     since, estimates = columns.run.from_ns, columns.estimates
     settled = estimates.capture_ns[(estimates.status == Status.TRACKING) & (estimates.capture_ns >= since)]
-    return float(settled.min() - since) * 1e-9 if len(settled) else None
+    return float(settled.min() - since) / 1e9 if len(settled) else None
 
 
 def _rms(error: FloatArray) -> float:

@@ -82,7 +82,7 @@ def test_a_short_run_is_as_good_as_it_should_be(judged: dict[str, Any]) -> None:
     assert [bounds["violations"][name] for name in BOUNDS if name.endswith("_extended")] == [0, 0, 0]
     assert bounds["M_rho"] == estimation["max"]["rho_dot"]
     assert bounds["M_alpha2"] == estimation["max"]["alpha2_dot"]
-    assert judged["formation"]["orbit_deviation_rms"]["rho"] < 0.02
+    assert judged["formation"]["orbit_deviation_rms"]["rho"] < 0.03
     assert judged["latency_ms"]["capture_to_command"]["p50"] == pytest.approx(30.0, abs=0.1)
     frames = judged["frames"]
     assert frames["published"] - frames["received"] == frames["lost"] > 0
