@@ -11,10 +11,10 @@ from formation.angles import FloatArray
 from formation.closed_loop import IntegrationError, Trajectory
 from formation.periodic_orbit import PeriodicOrbit, find_orbit
 from formation.spacing import lyapunov
-from hil import scenario_parts
 from hil.errors import CheckFailedError, UsageError
-from hil.scenario import Scenario
-from hil.simulation_figures import draw_experiment, draw_simulation
+from hil.figures.simulation_figures import draw_experiment, draw_simulation
+from hil.scenario import parts as scenario_parts
+from hil.scenario.schema import Scenario
 
 SAMPLE_STEP = 0.005
 MOST_SAMPLES = 200_000

@@ -11,10 +11,10 @@ import pytest
 from hatchling.builders.wheel import WheelBuilder
 
 import hil
-from hil.column_map import load_column_map
 from hil.errors import UsageError
-from hil.scenario_file import load_scenario, scenario_names
-from hil.topic_map import load_topic_map
+from hil.recordings.column_map import load_column_map
+from hil.replay.topic_map import load_topic_map
+from hil.scenario.files import load_scenario, scenario_names
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = {
@@ -114,7 +114,7 @@ def test_the_wheel_holds_the_four_packages_the_scenarios_and_the_maps(tmp_path: 
     data = {f"hil/data/{path.parent.name}/{path.name}" for path in (ROOT / "data").glob("*/*.toml")}
     assert {name for name in held if name.startswith("hil/data/")} == data
     sources = {named(path) for path in MODULES} | {
-        named(path) for path in (ROOT / "hil" / "msg").rglob("*.msg")
+        named(path) for path in (ROOT / "hil" / "wire" / "msg").rglob("*.msg")
     }
     assert sources <= held
     rest = held - data - sources

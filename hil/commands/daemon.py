@@ -8,11 +8,11 @@ from pathlib import Path
 import click
 
 from hil.errors import UsageError
-from hil.live_daemon import Ending, NodeWorker, Worker, run_daemon
-from hil.scenario import Scenario
-from hil.scenario_file import load_scenario
-from hil.session import Endpoints
-from hil.topics import topics_of
+from hil.live.daemon import Ending, NodeWorker, Worker, run_daemon
+from hil.scenario.files import load_scenario
+from hil.scenario.schema import Scenario
+from hil.wire.session import Endpoints
+from hil.wire.topics import topics_of
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
@@ -75,25 +75,25 @@ def daemon_command(name: str, summary: str) -> click.Command:
 
 
 def _emulator(scenario: Scenario, out: Path | None, needs: frozenset[str]) -> Worker:
-    from hil.emulator_node import EmulatorNode
+    from hil.emulator.node import EmulatorNode
 
     return NodeWorker(EmulatorNode(scenario, needs))
 
 
 def _estimator(scenario: Scenario, out: Path | None, needs: frozenset[str]) -> Worker:
-    from hil.estimator_node import EstimatorNode
+    from hil.nodes.estimator import EstimatorNode
 
     return NodeWorker(EstimatorNode(scenario))
 
 
 def _controller(scenario: Scenario, out: Path | None, needs: frozenset[str]) -> Worker:
-    from hil.controller_node import ControllerNode
+    from hil.nodes.controller import ControllerNode
 
     return NodeWorker(ControllerNode(scenario), parting="the controller ended")
 
 
 def _recorder(scenario: Scenario, out: Path | None, needs: frozenset[str]) -> Worker:
-    from hil.recorder import Recorder
+    from hil.live.recorder import Recorder
 
     if out is None:
         raise UsageError("abreast recorder: give the log to write with --out")

@@ -22,8 +22,8 @@ def command() -> None:
 )
 def import_table(recording: Path, chart: str, out: Path) -> None:
     """Turn the CSV file RECORDING into a log by a map of its columns."""
-    from hil.column_map import load_column_map
-    from hil.csv_import import import_csv
+    from hil.recordings.column_map import load_column_map
+    from hil.recordings.csv_import import import_csv
 
     done = import_csv(recording, load_column_map(chart), out)
     click.echo(

@@ -12,7 +12,7 @@ import click
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="LOG", help="The whole log.")
 def command(log: Path, out: Path) -> None:
     """Copy all that is whole in LOG to a new log that every reader opens."""
-    from hil.log_recovery import recover
+    from hil.log.recovery import recover
 
     done = recover(log, out)
     lost = "nothing is missing" if done.complete else f"cut off; {done.lost_bytes} bytes were of no use"

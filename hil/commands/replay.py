@@ -11,9 +11,9 @@ from hil.errors import CheckFailedError, UsageError
 from hil.report_json import print_json, write_json
 
 if TYPE_CHECKING:
-    from hil.evidence import Evidence
-    from hil.log_reader import Log
-    from hil.replay import Replay
+    from hil.judge.evidence import Evidence
+    from hil.log.reader import Log
+    from hil.replay.rerun import Replay
 
 
 @click.command("replay")
@@ -50,10 +50,10 @@ def command(
     --from and --to are seconds since the leader set off, for imported recordings the source's own time; the
     steps always begin where the log does.
     """
-    from hil.judge import summarise
-    from hil.log_reader import read_log
-    from hil.replay_verdict import evidence_of_replay, parity_json, violated_bounds, why_not_same
-    from hil.run_summary_text import print_summary
+    from hil.judge.summary import summarise
+    from hil.judge.summary_text import print_summary
+    from hil.log.reader import read_log
+    from hil.replay.verdict import evidence_of_replay, parity_json, violated_bounds, why_not_same
 
     if from_s is not None and to_s is not None and to_s <= from_s:
         raise UsageError(f"--to {to_s:g}: expected more than --from {from_s:g}")
@@ -88,10 +88,10 @@ def _played(
     verify: bool,
 ) -> Replay:
     """Replay of one of our logs, or of another lab's by its topic map."""
-    from hil.log_metadata import scenario_of
-    from hil.replay import replay, replay_foreign
-    from hil.scenario_file import with_overrides
-    from hil.topic_map import load_topic_map
+    from hil.log.metadata import scenario_of
+    from hil.replay.rerun import replay, replay_foreign
+    from hil.replay.topic_map import load_topic_map
+    from hil.scenario.files import with_overrides
 
     kind = [] if estimator is None else [f"estimator.kind={estimator}"]
     if chart is not None:
@@ -113,14 +113,14 @@ def _played(
 
 
 def _write(evidence: Evidence, summary: dict[str, Any], table: Path | None, out: Path | None) -> None:
-    from hil.estimate_csv import write_estimates
-    from hil.replay_verdict import evaluated
+    from hil.replay.estimate_csv import write_estimates
+    from hil.replay.verdict import evaluated
 
     if table is not None:
         write_estimates(evaluated(evidence), table)
     if out is None:
         return
-    from hil.run_figures import draw_run
+    from hil.figures.run_figures import draw_run
 
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -11,8 +11,8 @@ import click
 
 from hil.errors import CheckFailedError, UsageError
 from hil.report_json import print_json, write_json
-from hil.scenario import Scenario
-from hil.scenario_file import load_scenario
+from hil.scenario.files import load_scenario
+from hil.scenario.schema import Scenario
 
 DURATION = click.FloatRange(min=0, min_open=True)
 
@@ -76,7 +76,7 @@ def _folder(scenario: Scenario, out: Path | None) -> Path:
 
 
 def _lockstep(scenario: Scenario, log_path: Path) -> str:
-    from hil.lockstep_run import run_lockstep
+    from hil.nodes.lockstep_run import run_lockstep
 
     begun = time.perf_counter()
     run_lockstep(scenario, log_path)
@@ -92,10 +92,10 @@ def _lockstep(scenario: Scenario, log_path: Path) -> str:
 def _live(scenario: Scenario, folder: Path, log_path: Path, listen: str | None) -> str:
     from rich.console import Console
 
-    from hil.live_daemon import Ending
-    from hil.live_run import run_live
-    from hil.live_watch import Picture
-    from hil.session import free_endpoint
+    from hil.live.daemon import Ending
+    from hil.live.run import run_live
+    from hil.live.watch import Picture
+    from hil.wire.session import free_endpoint
 
     ending = Ending()
     ending.on_signals()
@@ -114,8 +114,8 @@ def _live(scenario: Scenario, folder: Path, log_path: Path, listen: str | None) 
 
 def _make_whole(log_path: Path) -> None:
     """Recover the log if the recorder was cut off; what it left stays beside it as ``run.cut.mcap``."""
-    from hil.log_reader import read_log
-    from hil.log_recovery import recover
+    from hil.log.reader import read_log
+    from hil.log.recovery import recover
 
     try:
         read_log(log_path)
@@ -130,11 +130,11 @@ def _make_whole(log_path: Path) -> None:
 
 def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
     """Judge the log, and leave summary and picture beside it."""
-    from hil.evidence import evidence_of_log
-    from hil.judge import summarise
-    from hil.log_reader import read_log
-    from hil.run_figures import draw_run
-    from hil.run_summary_text import print_summary
+    from hil.figures.run_figures import draw_run
+    from hil.judge.evidence import evidence_of_log
+    from hil.judge.summary import summarise
+    from hil.judge.summary_text import print_summary
+    from hil.log.reader import read_log
 
     evidence = evidence_of_log(read_log(log_path))
     summary = summarise(evidence)

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from hil.report_json import print_json
-from hil.scenario_file import load_scenario
+from hil.scenario.files import load_scenario
 
 
 @click.command("simulate")

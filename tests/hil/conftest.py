@@ -11,10 +11,11 @@ from estimation.tracking import Status
 from formation import pose as plane
 from formation.angles import wrap
 from formation.shape import Shape, follower_pose, shape_of, shape_rates
-from hil.evidence import Evidence, Frames, LogFacts
-from hil.lockstep_run import run_lockstep
-from hil.log_reader import Log, read_log
-from hil.message_types import (
+from hil.judge.evidence import Evidence, Frames, LogFacts
+from hil.log.reader import Log, read_log
+from hil.nodes.lockstep_run import run_lockstep
+from hil.scenario.files import load_scenario
+from hil.wire.message_types import (
     Command,
     Consumed,
     DiagnosticArray,
@@ -38,8 +39,7 @@ from hil.message_types import (
     TwistWithCovariance,
     Vector3,
 )
-from hil.messages import header, to_time
-from hil.scenario_file import load_scenario
+from hil.wire.messages import header, to_time
 
 STAMP_NS = 1_700_000_000_123_456_789
 

@@ -11,10 +11,10 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from hil.command_line import main
-from hil.lockstep_run import run_lockstep
-from hil.log_reader import read_log
-from hil.log_writer import LogWriter
-from hil.scenario_file import load_scenario
+from hil.log.reader import read_log
+from hil.log.writer import LogWriter
+from hil.nodes.lockstep_run import run_lockstep
+from hil.scenario.files import load_scenario
 
 TABLE = "t,r,b,u,v\n" + "".join(f"{100 + 0.1 * n:.1f},0.2,1.5708,0,0.1\n" for n in range(60))
 COLUMNS = """

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from hil.errors import CheckFailedError, UsageError
-from hil.scenario_file import load_scenario
+from hil.scenario.files import load_scenario
 from hil.simulation import simulate
 
 DEGREE = math.pi / 180.0

@@ -1,0 +1,1 @@
+"""The lab that is not there: robots and motion capture."""

@@ -1,0 +1,168 @@
+"""The picture of a run: tracks from above, shape, estimates with bounds, commands and latency."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from PIL import Image
+
+from hil.figures.robot_drawing import draw_pair
+from hil.figures.run_panels import Panel, Shown, panels_for
+from hil.judge.columns import columns_of, inside
+from hil.judge.evidence import Evidence
+from hil.judge.noise_free_orbit import noise_free_orbit
+
+DPI = 96
+_HEIGHT = 8.4
+_TRACKS_WIDTH, _STACK_WIDTH = 5.4, 3.85
+# Margins in inches: fixed, since a layout engine would take longer than all the drawing.
+_LEFT, _RIGHT, _TOP, _BOTTOM, _BETWEEN = 0.72, 0.14, 0.62, 0.48, 0.84
+_RATIOS = (3.7, 1.0)
+_LABEL_OFFSET = 0.54
+_COLOURS = 255
+_UNJUDGED = "#000000"
+
+
+def draw_run(evidence: Evidence, summary: Mapping[str, Any], path: Path) -> None:
+    """Write a PNG of a run or a replay; ``summary`` is what :func:`hil.judge.summary.summarise` says of it.
+
+    What the evidence does not hold is left out: without truth the tracks, without commands their panels.
+    """
+    columns = columns_of(evidence)
+    driven = evidence.motion_since_ns is not None
+    orbit = noise_free_orbit(evidence.scenario, columns.truth, columns.run) if driven else None
+    shown = Shown.of(evidence, columns, orbit)
+    figure = _figure(shown)
+    figure.suptitle(_title(summary), fontsize=11, y=1.0 - 0.1 / _HEIGHT)
+    _save(figure, path)
+
+
+def _figure(shown: Shown) -> Figure:
+    """Tracks over the latency to the left, then two stacks of panels; what there is."""
+    below, *stacks = panels_for(shown)
+    tracks = bool(np.any(np.isfinite(shown.columns.truth.rho)))
+    if not tracks:
+        stacks, below = [[*stacks[0], *below], stacks[1]], []
+    widths = ([_TRACKS_WIDTH] if tracks else []) + [_STACK_WIDTH for stack in stacks if stack]
+    width = sum(widths) + _LEFT + _RIGHT + _BETWEEN * (len(widths) - 1)
+    figure = Figure(
+        figsize=(round(max(width, _TRACKS_WIDTH) * DPI) / DPI, round(_HEIGHT * DPI) / DPI), dpi=DPI
+    )
+    edges = {"bottom": _BOTTOM / _HEIGHT, "top": 1.0 - _TOP / _HEIGHT}
+    left = _LEFT
+    if tracks:
+        across = {"left": left / width, "right": (left + _TRACKS_WIDTH) / width}
+        grid = figure.add_gridspec(
+            1 + len(below), 1, height_ratios=_RATIOS[: 1 + len(below)], hspace=0.2, **across, **edges
+        )
+        _draw_tracks(figure.add_subplot(grid[0]), shown)
+        _draw_stack([figure.add_subplot(grid[1 + row]) for row in range(len(below))], below, shown)
+        left += _TRACKS_WIDTH + _BETWEEN
+    for stack in filter(None, stacks):
+        right = left + _STACK_WIDTH
+        grid = figure.add_gridspec(
+            len(stack), 1, left=left / width, right=right / width, hspace=0.12, **edges
+        )
+        _draw_stack([figure.add_subplot(grid[row]) for row in range(len(stack))], stack, shown)
+        left = right + _BETWEEN
+    return figure
+
+
+def _draw_tracks(axes: Axes, shown: Shown) -> None:
+    truth, run = shown.columns.truth, shown.columns.run
+    during = inside(truth.capture_ns, run)
+    draw_pair(
+        axes,
+        shown.seconds(truth.capture_ns[during]),
+        truth.leader[during],
+        truth.follower[during],
+    )
+
+
+def _draw_stack(rows: list[Axes], stack: list[Panel], shown: Shown) -> None:
+    """Panels below each other over the same time; shaded where the run is not judged."""
+    if not stack:
+        return
+    run, span = shown.columns.run, shown.columns.span
+    first, last = (float(shown.seconds(np.array([moment]))[0]) for moment in (run.from_ns, run.to_ns))
+    judged_from = float(shown.seconds(np.array([span.from_ns]))[0])
+    for axes, panel in zip(rows, stack, strict=True):
+        panel(axes, shown)
+        axes.set_xlim(first, last)
+        if judged_from > first:
+            axes.axvspan(first, judged_from, color=_UNJUDGED, alpha=0.045, lw=0, zorder=0)
+            if axes is rows[0]:
+                axes.text(0.012, 0.04, "not judged", transform=axes.transAxes, fontsize=7.5, color="#666666")
+        axes.grid(alpha=0.25)
+        axes.tick_params(labelbottom=axes is rows[-1])
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high + 0.22 * (high - low))
+        axes.legend(
+            loc="upper right",
+            ncols=5,
+            fontsize=8,
+            handlelength=1.4,
+            borderpad=0.15,
+            borderaxespad=0.25,
+            framealpha=0.75,
+            edgecolor="none",
+        )
+    rows[-1].set_xlabel("t [s]")
+    for axes in rows:
+        axes.xaxis.set_major_locator(MaxNLocator(7, steps=[1, 2, 5, 10]))
+        axes.yaxis.set_label_coords(-_LABEL_OFFSET * DPI / axes.bbox.width, 0.5)
+        axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
+
+
+def _save(figure: Figure, path: Path) -> None:
+    """Write the figure with a palette: a third of the bytes, and no difference to the eye."""
+    FigureCanvasAgg(figure)
+    drawn = BytesIO()
+    figure.savefig(drawn, format="rgba", dpi=DPI)
+    size = (round(figure.bbox.width), round(figure.bbox.height))
+    picture = Image.frombuffer("RGBA", size, drawn.getvalue()).convert("RGB")
+    picture.quantize(_COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(path, "PNG")
+
+
+def _title(summary: Mapping[str, Any]) -> str:
+    """Two lines: what was run, and how well it went."""
+    run = [
+        f"{summary['scenario']}",
+        f"{summary['mode']}, {summary['duration_s']:.3g} s",
+        summary["estimator"],
+    ]
+    if "law" in summary:
+        run.append(f"{summary['law']} law")
+    if "seed" in summary:
+        run.append(f"seed {summary['seed']}")
+    return " · ".join(run) + "\n" + " · ".join(_findings(summary))
+
+
+def _findings(summary: Mapping[str, Any]) -> list[str]:
+    estimation = summary["estimation"]
+    found = [f"from {estimation['evaluated_from_s']:.3g} s on"]
+    rmse = estimation.get("rmse", {})
+    if "v1" in rmse:
+        found.append(f"$v_1$ RMSE {1e3 * rmse['v1']:.1f} mm/s")
+    if "alpha1" in rmse:
+        found.append(rf"$\alpha_1$ RMSE {math.degrees(rmse['alpha1']):.1f}°")
+    formation = summary.get("formation", {})
+    if "rho_min" in formation:
+        found.append(rf"$\rho$ in [{formation['rho_min']:.3f}, {formation['rho_max']:.3f}] m")
+    bounds = summary["bounds"]
+    if "violations" in bounds:
+        broken = max(count for name, count in bounds["violations"].items() if name.endswith("_extended"))
+        found.append(f"extended bounds broken in {broken} of {bounds['checked']}")
+    latency = summary.get("latency_ms", {}).get("capture_to_command")
+    if latency:
+        found.append(f"latency p99 {latency['p99']:.0f} ms")
+    return found

@@ -1,0 +1,235 @@
+"""The panels of a run's picture, each a plot over time; none is drawn that has nothing to show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from estimation.bounds import Values
+from estimation.estimate import QUANTITIES
+from estimation.tracking import Status
+from formation.angles import FloatArray, wrap
+from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2
+from hil.figures.panel_strokes import (
+    BELIEVED,
+    LIMIT,
+    broken_at_jumps,
+    draw_bounds,
+    fill_band,
+    limit_to,
+    mark_violations,
+    with_gaps,
+)
+from hil.figures.robot_drawing import FOLLOWER
+from hil.judge.bounds import named_bounds, worst_errors
+from hil.judge.columns import Columns, EstimateColumns
+from hil.judge.evidence import Evidence
+from hil.judge.noise_free_orbit import NoiseFreeOrbit
+from hil.judge.true_states import Stamps, TrueStates
+
+TRUE, ORBIT = "#3c3c3c", "#7a5fa8"
+_FARTHEST = 4.0
+"""A bound that is so many times out of the picture is left out: it would flatten the rest."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shown:
+    """What the panels draw from. ``tracked``: estimates of the whole run that say TRACKING, and their truth.
+
+    ``bounds``: the named bounds at the judged samples; ``orbit``: the noise-free run, where it is known.
+    """
+
+    evidence: Evidence
+    columns: Columns
+    tracked: EstimateColumns
+    tracked_true: TrueStates
+    bounds: Mapping[str, FloatArray]
+    orbit: NoiseFreeOrbit | None
+
+    @staticmethod
+    def of(evidence: Evidence, columns: Columns, orbit: NoiseFreeOrbit | None) -> Shown:
+        """Gather what the panels need."""
+        during = columns.estimates.capture_ns <= columns.run.to_ns
+        tracked = columns.estimates.only((columns.estimates.status == Status.TRACKING) & during)
+        bounds: Mapping[str, FloatArray] = {}
+        if len(columns.samples.capture_ns):
+            bounds = named_bounds(evidence.scenario, columns, worst_errors(evidence.scenario, columns))
+        true = columns.truth.at(tracked.capture_ns)
+        return Shown(evidence, columns, tracked, true, bounds, orbit)
+
+    def seconds(self, moments_ns: Stamps) -> FloatArray:
+        """Moments as seconds of the run."""
+        return np.asarray((moments_ns - self.evidence.zero_ns) * 1e-9, dtype=np.float64)
+
+    @property
+    def drawn_bound(self) -> str:
+        """Suffix of the bounds that are drawn: the sound ones where true rates are known, else extended."""
+        return "" if np.any(np.isfinite(self.columns.true.rho_dot)) else "_extended"
+
+
+def draw_distance(axes: Axes, shown: Shown) -> None:
+    """Distance: true (estimated where the truth is not known), on the noise-free orbit, and desired."""
+    _draw_desired(axes, shown, shown.evidence.scenario.formation.rho_0, r"$\rho_0$")
+    _draw_shape(axes, shown, shown.columns.truth.rho, shown.tracked.seen.rho, 0)
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel(r"$\rho$ [m]")
+
+
+def draw_alpha1(axes: Axes, shown: Shown) -> None:
+    """Bearing of the follower from the leader, as :func:`draw_distance`."""
+    _draw_desired(axes, shown, ABREAST_ALPHA1, r"$-\pi/2$")
+    _draw_shape(axes, shown, shown.columns.truth.alpha1, shown.tracked.seen.alpha1, 1)
+    axes.set_ylabel(r"$\alpha_1$ [rad]")
+
+
+def draw_alpha2(axes: Axes, shown: Shown) -> None:
+    """Bearing of the leader from the follower, as :func:`draw_distance`."""
+    _draw_desired(axes, shown, ABREAST_ALPHA2, r"$\pi/2$")
+    _draw_shape(axes, shown, shown.columns.truth.alpha2, shown.tracked.seen.alpha2, 2)
+    axes.set_ylabel(r"$\alpha_2$ [rad]")
+
+
+def draw_v1(axes: Axes, shown: Shown) -> None:
+    """Leader's speed: estimate with three standard deviations, truth, and bound where it is judged."""
+    columns, seen = shown.columns, shown.tracked.seen
+    t, v1, sd = shown.seconds(shown.tracked.capture_ns), np.asarray(seen.v1), shown.tracked.sd[:, 2]
+    fill_band(axes, t, v1, 3.0 * sd)
+    axes.plot(*with_gaps(t, v1), color=BELIEVED, lw=0.9, label="estimate")
+    if np.any(np.isfinite(columns.truth.v1)):
+        axes.plot(
+            shown.seconds(columns.truth.capture_ns), columns.truth.v1, color=TRUE, lw=1.2, label="truth"
+        )
+    reach = max(shown.evidence.scenario.leader.k_v, float(np.median(v1)))
+    judged = shown.seconds(columns.samples.capture_ns)
+    if "v1" in shown.bounds:
+        bound, centre = shown.bounds["v1" + shown.drawn_bound], np.asarray(columns.samples.seen.v1)
+        if np.min(bound) < reach:
+            draw_bounds(axes, judged, centre - bound, centre + bound, shown.drawn_bound)
+        mark_violations(axes, judged, centre, np.abs(centre - columns.true.v1), bound)
+    limit_to(axes, 0.0, 1.8 * reach)
+    axes.set_ylabel("$v_1$ [m/s]")
+
+
+def draw_alpha1_error(axes: Axes, shown: Shown) -> None:
+    """Error of the leader's bearing: estimate minus truth, three standard deviations, and bound."""
+    columns = shown.columns
+    t, sd = shown.seconds(shown.tracked.capture_ns), shown.tracked.sd[:, QUANTITIES.index("alpha1")]
+    error = wrap(np.asarray(shown.tracked.seen.alpha1) - shown.tracked_true.alpha1)
+    fill_band(axes, t, np.zeros(len(t)), 3.0 * sd)
+    axes.plot(*with_gaps(t, error), color=BELIEVED, lw=0.9, label="error")
+    reach = 4.0 * float(np.median(sd))
+    judged = shown.seconds(columns.samples.capture_ns)
+    if "alpha1" in shown.bounds:
+        bound = shown.bounds["alpha1" + shown.drawn_bound]
+        at_samples = wrap(np.asarray(columns.samples.seen.alpha1) - columns.true.alpha1)
+        largest = float(np.max(np.abs(at_samples), where=np.isfinite(at_samples), initial=0.0))
+        reach = max(reach, 1.5 * largest)
+        if np.max(bound) < _FARTHEST * reach:
+            reach = max(reach, 1.15 * float(np.max(bound)))
+            draw_bounds(axes, judged, -bound, bound, shown.drawn_bound)
+        mark_violations(axes, judged, at_samples, np.abs(at_samples), bound)
+    axes.set_ylim(-min(reach, math.pi), min(reach, math.pi))
+    axes.set_ylabel(r"$\hat\alpha_1 - \alpha_1$ [rad]")
+
+
+def draw_u1(axes: Axes, shown: Shown) -> None:
+    """Leader's turn rate: estimate with three standard deviations, and truth."""
+    t, u1, sd = shown.seconds(shown.tracked.capture_ns), shown.tracked.u1, shown.tracked.sd[:, 4]
+    fill_band(axes, t, u1, 3.0 * sd)
+    axes.plot(*with_gaps(t, u1), color=BELIEVED, lw=0.9, label="estimate")
+    truth = shown.columns.truth
+    if np.any(np.isfinite(truth.u1)):
+        axes.plot(shown.seconds(truth.capture_ns), truth.u1, color=TRUE, lw=1.2, label="truth")
+    reach = 2.0 * shown.evidence.scenario.leader.k_u
+    limit_to(axes, -reach, reach)
+    axes.set_ylabel("$u_1$ [rad/s]")
+
+
+def draw_v2(axes: Axes, shown: Shown) -> None:
+    """Follower's speed as commanded, against its limit."""
+    _draw_command(axes, shown, shown.columns.commands.v2, shown.evidence.scenario.controller.v_max)
+    axes.set_ylabel("$v_2$ [m/s]")
+
+
+def draw_u2(axes: Axes, shown: Shown) -> None:
+    """Follower's turn rate as commanded, against its limit."""
+    _draw_command(axes, shown, shown.columns.commands.u2, shown.evidence.scenario.controller.u_max)
+    axes.set_ylabel("$u_2$ [rad/s]")
+
+
+def draw_latency(axes: Axes, shown: Shown) -> None:
+    """From the capture of every frame to the first command that rests on it."""
+    commands = shown.columns.commands
+    first = commands.fresh
+    waits_ms = (commands.issued_ns - commands.capture_ns)[first] * 1e-6
+    axes.plot(
+        shown.seconds(commands.issued_ns[first]),
+        waits_ms,
+        ls="none",
+        marker=".",
+        ms=2.0,
+        color=FOLLOWER,
+        label="capture to command",
+    )
+    median = float(np.median(waits_ms))
+    axes.set_ylim(0.0, 1.6 * max(float(np.percentile(waits_ms, 99.5)), 1.05 * median))
+    axes.set_ylabel("latency [ms]")
+
+
+Panel = Callable[[Axes, Shown], None]
+
+
+def panels_for(shown: Shown) -> tuple[list[Panel], list[Panel], list[Panel]]:
+    """Panels that have something to show: of the wire, of the shape, of the leader's motion and commands."""
+    columns, estimated = shown.columns, len(shown.tracked.capture_ns) > 0
+    wire: list[Panel] = [draw_latency] if np.any(columns.commands.fresh) else []
+    shape: list[Panel] = []
+    motion: list[Panel] = []
+    if estimated or np.any(np.isfinite(columns.truth.rho)):
+        shape += [draw_distance, draw_alpha1, draw_alpha2]
+    if estimated:
+        motion += (
+            [draw_v1, draw_alpha1_error] if np.any(np.isfinite(shown.tracked_true.alpha1)) else [draw_v1]
+        )
+    if len(columns.commands.issued_ns):
+        motion += [draw_v2, draw_u2]
+    if estimated:
+        (shape if len(shape) < 4 and len(motion) == 4 else motion).append(draw_u1)
+    return wire, shape, motion
+
+
+def _draw_desired(axes: Axes, shown: Shown, value: float, label: str) -> None:
+    """Where the formation wants a quantity; other labs' robots were not told."""
+    if shown.evidence.motion_since_ns is not None:
+        axes.axhline(value, color=LIMIT, lw=1.0, ls=":", label=label)
+
+
+def _draw_shape(axes: Axes, shown: Shown, true: FloatArray, seen: Values, column: int) -> None:
+    """True and noise-free course of a quantity; what was estimated where one of them is missing."""
+    moments = shown.columns.truth.capture_ns
+    known = bool(np.any(np.isfinite(true)))
+    if shown.orbit is not None:
+        wanted = moments[moments >= shown.orbit.from_ns]
+        ideal = with_gaps(shown.seconds(wanted), broken_at_jumps(shown.orbit.at(wanted)[column]))
+        axes.plot(*ideal, color=ORBIT, lw=1.1, ls="--", label="noise-free", zorder=3)
+    if known:
+        truth = with_gaps(shown.seconds(moments), broken_at_jumps(true))
+        axes.plot(*truth, color=TRUE, lw=1.4, label="truth")
+    if shown.orbit is None or not known:
+        t = shown.seconds(shown.tracked.capture_ns)
+        estimate = with_gaps(t, broken_at_jumps(np.asarray(seen)))
+        axes.plot(*estimate, color=BELIEVED, lw=1.1, label="estimate")
+
+
+def _draw_command(axes: Axes, shown: Shown, sent: FloatArray, limit: float) -> None:
+    t = shown.seconds(shown.columns.commands.issued_ns)
+    axes.plot(t, sent, color=FOLLOWER, lw=1.0, drawstyle="steps-post", label="command")
+    low, high = min(float(np.min(sent)), 0.0), float(np.max(sent))
+    # A limit far outside what is driven would only flatten the curve.
+    near = [side for side in (limit, -limit) if 1.6 * low <= side <= 1.6 * high]
+    for index, side in enumerate(near):
+        axes.axhline(side, color=LIMIT, lw=1.0, ls=":", label="limit" if index == 0 else None)

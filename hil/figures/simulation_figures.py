@@ -1,0 +1,209 @@
+"""Pictures of the noise-free experiments, laid out like the paper's Fig. 2 and Fig. 3."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Polygon
+from matplotlib.projections.polar import PolarAxes
+from matplotlib.ticker import MaxNLocator
+
+from formation.angles import FloatArray
+from formation.closed_loop import Trajectory
+from formation.periodic_orbit import PeriodicOrbit
+from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2
+from hil.scenario.schema import Scenario
+
+LEADER, FOLLOWER = "#1f5fa8", "#d9741a"
+ORBIT, NOW, QUIET, LIMIT = "#3c3c3c", "#2a8f4c", "#8a8a8a", "#b03030"
+MOMENTS = 7
+DPI = 130
+_PI_TICKS = {
+    -math.pi: r"$-\pi$",
+    ABREAST_ALPHA1: r"$-\pi/2$",
+    0.0: "$0$",
+    ABREAST_ALPHA2: r"$\pi/2$",
+    math.pi: r"$\pi$",
+}
+_POLAR_TICKS = ("$0$", r"$\pi/4$", r"$\pi/2$", r"$3\pi/4$", r"$\pi$", r"$-3\pi/4$", r"$-\pi/2$", r"$-\pi/4$")
+
+
+def draw_simulation(
+    scenario: Scenario, trajectory: Trajectory, orbit: PeriodicOrbit | None, path: Path
+) -> None:
+    """Write a PNG like Fig. 2: (i) tracks, (ii) polar plot of the shape, (iii) bearings and controls."""
+    figure = _figure(scenario, trajectory, 14.0, 5.0)
+    grid = figure.add_gridspec(3, 3, width_ratios=(1.05, 0.95, 1.2))
+    draw_tracks(figure.add_subplot(grid[:, 0]), trajectory, scenario.formation.rho_0)
+    # The layout engine does not reserve room for what sticks out of a polar plot: give it empty rows.
+    middle = grid[:, 1].subgridspec(3, 1, height_ratios=(0.05, 1.0, 0.13))
+    polar = figure.add_subplot(middle[1], projection="polar")
+    assert isinstance(polar, PolarAxes)
+    draw_polar(polar, trajectory, orbit, scenario.formation.rho_0)
+    rows = [figure.add_subplot(grid[row, 2]) for row in range(3)]
+    draw_bearings(rows[0], trajectory)
+    draw_speed(rows[1], scenario, trajectory)
+    draw_turn_rate(rows[2], scenario, trajectory)
+    _share_time(rows, trajectory)
+    _save(figure, path)
+
+
+def draw_experiment(scenario: Scenario, trajectory: Trajectory, path: Path) -> None:
+    """Write a PNG like Fig. 3: (a) tracks, (b) shape variables and controls over time."""
+    figure = _figure(scenario, trajectory, 11.5, 6.0)
+    grid = figure.add_gridspec(4, 2, width_ratios=(1.0, 1.15))
+    draw_tracks(figure.add_subplot(grid[:, 0]), trajectory, scenario.formation.rho_0)
+    rows = [figure.add_subplot(grid[row, 1]) for row in range(4)]
+    draw_distance(rows[0], trajectory, scenario.formation.rho_0)
+    draw_bearings(rows[1], trajectory)
+    draw_speed(rows[2], scenario, trajectory)
+    draw_turn_rate(rows[3], scenario, trajectory)
+    _share_time(rows, trajectory)
+    _save(figure, path)
+
+
+def draw_tracks(axes: Axes, trajectory: Trajectory, rho_0: float) -> None:
+    """Both tracks from above, robots drawn at equally spaced moments with growing opacity."""
+    leader, follower = trajectory.leader, trajectory.follower
+    axes.plot(leader[:, 0], leader[:, 1], color=LEADER, lw=1.2, alpha=0.7, label="leader", zorder=2)
+    axes.plot(follower[:, 0], follower[:, 1], color=FOLLOWER, lw=1.2, alpha=0.7, label="follower", zorder=2)
+    moments = np.linspace(0, len(trajectory.t) - 1, MOMENTS).round().astype(int)
+    for row, opacity in zip(moments, np.linspace(0.2, 1.0, MOMENTS).tolist(), strict=True):
+        ends = np.stack([leader[row, :2], follower[row, :2]])
+        axes.plot(ends[:, 0], ends[:, 1], color=QUIET, lw=0.8, alpha=opacity, zorder=1)
+        _draw_robot(axes, leader[row], 0.22 * rho_0, LEADER, opacity)
+        _draw_robot(axes, follower[row], 0.22 * rho_0, FOLLOWER, opacity)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.08)
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    axes.grid(alpha=0.25)
+    axes.legend(loc="best", frameon=False, fontsize=9)
+
+
+def draw_polar(axes: PolarAxes, trajectory: Trajectory, orbit: PeriodicOrbit | None, rho_0: float) -> None:
+    """Shape in the plane: radius rho / rho_0 at angle alpha1 (of the follower) and alpha2 (of the leader)."""
+    radius = trajectory.rho / rho_0
+    curves = (
+        (trajectory.alpha1, ABREAST_ALPHA1, LEADER, r"$(\rho/\rho_0,\ \alpha_1)$"),
+        (trajectory.alpha2, ABREAST_ALPHA2, FOLLOWER, r"$(\rho/\rho_0,\ \alpha_2)$"),
+    )
+    for angle, desired, colour, label in curves:
+        axes.plot(np.unwrap(angle), radius, color=colour, lw=1.4, label=label)
+        axes.plot(angle[0], radius[0], "o", ms=6, mfc="white", mec=colour, zorder=4)
+        axes.plot(desired, 1.0, "o", ms=8, color=colour, zorder=5, clip_on=False)
+    if orbit is not None and float(np.ptp(orbit.rho)) > 1e-6 * rho_0:
+        axes.plot(
+            np.unwrap(orbit.alpha1), orbit.rho / rho_0, color=ORBIT, lw=1.0, ls="--", label="orbit", zorder=6
+        )
+    final = f"t = {trajectory.t[-1]:g} s"
+    axes.plot(trajectory.alpha1[-1], radius[-1], "o", ms=5, color=NOW, zorder=7, label=final)
+    axes.set_rmax(1.08 * float(radius.max()))
+    axes.set_rlabel_position(180.0)
+    axes.yaxis.set_major_locator(MaxNLocator(4, prune="lower"))
+    axes.set_xticks(np.arange(8) * math.pi / 4)
+    axes.set_xticklabels(_POLAR_TICKS)
+    axes.tick_params(labelsize=8, colors="#444444")
+    axes.grid(alpha=0.3)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, frameon=False, fontsize=9)
+
+
+def draw_distance(axes: Axes, trajectory: Trajectory, rho_0: float) -> None:
+    """Distance over time, rho_0 dashed."""
+    axes.axhline(rho_0, color=ORBIT, lw=1.0, ls="--")
+    axes.plot(trajectory.t, trajectory.rho, color=NOW, lw=1.4)
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel(r"$\rho$ [m]")
+
+
+def draw_bearings(axes: Axes, trajectory: Trajectory) -> None:
+    """Bearings over time, their desired values dashed."""
+    for angle, desired, colour, label in (
+        (trajectory.alpha1, ABREAST_ALPHA1, LEADER, r"$\alpha_1$"),
+        (trajectory.alpha2, ABREAST_ALPHA2, FOLLOWER, r"$\alpha_2$"),
+    ):
+        axes.axhline(desired, color=colour, lw=1.0, ls="--", alpha=0.8)
+        axes.plot(trajectory.t, _broken_at_jumps(angle), color=colour, lw=1.4, label=label)
+    low = min(float(trajectory.alpha1.min()), float(trajectory.alpha2.min()), ABREAST_ALPHA1) - 0.3
+    high = max(float(trajectory.alpha1.max()), float(trajectory.alpha2.max()), ABREAST_ALPHA2) + 0.3
+    axes.set_ylim(low, high)
+    axes.set_yticks([tick for tick in _PI_TICKS if low <= tick <= high])
+    axes.set_yticklabels([text for tick, text in _PI_TICKS.items() if low <= tick <= high])
+    axes.set_ylabel(r"$\alpha_i$ [rad]")
+    axes.legend(loc="center right", ncols=2, frameon=False, fontsize=9, borderaxespad=0.1)
+
+
+def draw_speed(axes: Axes, scenario: Scenario, trajectory: Trajectory) -> None:
+    """Follower's speed over time; dashed v1 + rho_0 u1, the speed that holds the formation exactly."""
+    desired = trajectory.v1 + scenario.formation.rho_0 * trajectory.u1
+    _draw_control(axes, trajectory.t, trajectory.v2, desired, scenario.controller.v_max)
+    axes.set_ylabel("$v_2$ [m/s]")
+
+
+def draw_turn_rate(axes: Axes, scenario: Scenario, trajectory: Trajectory) -> None:
+    """Follower's turn rate over time; dashed u1, the rate that holds the formation exactly."""
+    _draw_control(axes, trajectory.t, trajectory.u2, trajectory.u1, scenario.controller.u_max)
+    axes.set_ylabel("$u_2$ [rad/s]")
+
+
+def _draw_control(axes: Axes, t: FloatArray, driven: FloatArray, desired: FloatArray, limit: float) -> None:
+    axes.plot(t, desired, color=ORBIT, lw=1.0, ls="--", label="desired")
+    axes.plot(t, driven, color=FOLLOWER, lw=1.4, label="follower")
+    # A limit far outside what is driven would only flatten the curves.
+    near = [side for side in (limit, -limit) if 1.5 * driven.min() <= side <= 1.5 * driven.max()]
+    for index, side in enumerate(near):
+        label = "limit (not applied)" if index == 0 else None
+        axes.axhline(side, color=LIMIT, lw=1.0, ls=":", label=label)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.3 * (high - low))
+    axes.legend(loc="upper right", ncols=3, frameon=False, fontsize=8, borderaxespad=0.1)
+
+
+def _draw_robot(axes: Axes, pose: FloatArray, radius: float, colour: str, opacity: float) -> None:
+    x, y, theta = (float(value) for value in pose)
+    axes.add_patch(
+        Circle((x, y), radius, facecolor=colour, edgecolor="white", lw=0.6, alpha=opacity, zorder=3)
+    )
+    corners = [theta, theta + 2.5, theta - 2.5]
+    reach = (0.8, 0.65, 0.65)
+    arrow = [
+        (x + radius * r * math.cos(corner), y + radius * r * math.sin(corner))
+        for r, corner in zip(reach, corners, strict=True)
+    ]
+    axes.add_patch(Polygon(arrow, closed=True, facecolor="white", lw=0, alpha=opacity, zorder=4))
+
+
+def _broken_at_jumps(angle: FloatArray) -> FloatArray:
+    """Angle with NaN where it passes through pi, so that no line is drawn across the panel."""
+    broken = angle.copy()
+    broken[1:][np.abs(np.diff(angle)) > math.pi] = math.nan
+    return broken
+
+
+def _share_time(rows: list[Axes], trajectory: Trajectory) -> None:
+    for axes in rows:
+        axes.set_xlim(float(trajectory.t[0]), float(trajectory.t[-1]))
+        axes.grid(alpha=0.25)
+        axes.tick_params(labelbottom=axes is rows[-1])
+    rows[-1].set_xlabel("t [s]")
+    rows[0].figure.align_ylabels(rows)
+
+
+def _figure(scenario: Scenario, trajectory: Trajectory, width: float, height: float) -> Figure:
+    figure = Figure(figsize=(width, height), layout="constrained")
+    proposition = {"ideal": "Prop. 1", "independent": "Prop. 2"}[scenario.controller.law]
+    figure.suptitle(
+        f"{scenario.name}: {scenario.controller.law} law ({proposition}), noise-free, {trajectory.t[-1]:g} s",
+        fontsize=11,
+    )
+    return figure
+
+
+def _save(figure: Figure, path: Path) -> None:
+    FigureCanvasAgg(figure)
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})

@@ -1,0 +1,104 @@
+"""Whether the bounds held: errors against their bounds, from rate and input errors known or assumed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.bound_check import SpeedInputs, all_bounds, check, errors_of
+from estimation.bounds import InputErrors, RateErrors, Values
+from formation.angles import FloatArray, wrap
+from formation.spacing import Spacing
+from hil.judge.columns import Columns, EstimateColumns
+from hil.scenario.schema import Scenario
+from hil.wire.estimate_message import AssumedErrors
+
+_ERRORS = ("M_rho", "M_alpha2", "E_rho", "E_alpha2", "E_v2", "E_u2")
+_NEAREST = 1e-6  # m; nobody is nearer, and bounds divide by the distance
+
+
+@dataclass(frozen=True, slots=True)
+class WorstErrors:
+    """What the bounds rest on, for all samples."""
+
+    rates: RateErrors
+    inputs: InputErrors
+
+
+def judge_bounds(scenario: Scenario, columns: Columns) -> dict[str, object]:
+    """The ``bounds`` part of a summary.
+
+    ``M_rho``, ``M_alpha2``: the rate errors that the bounds rest on, of :func:`worst_errors`; where they
+    change from sample to sample, the largest. ``checked``: samples at which the truth is known; without any
+    there are neither violations nor tightness.
+    """
+    samples, true = columns.samples, columns.true
+    if not len(samples.capture_ns):
+        return {"v_eps": scenario.leader.v_eps, "checked": 0}
+    given = worst_errors(scenario, columns)
+    known = np.isfinite(true.rho) & np.isfinite(true.v1) & np.isfinite(true.alpha1)
+    result: dict[str, object] = {
+        "M_rho": float(np.max(given.rates.M_rho)),
+        "M_alpha2": float(np.max(given.rates.M_alpha2)),
+        "v_eps": scenario.leader.v_eps,
+        "checked": int(np.count_nonzero(known)),
+    }
+    if not np.any(known):
+        return result
+    spacing = Spacing(scenario.formation.rho_0, scenario.controller.mu_rho)
+    mu1 = scenario.controller.mu1
+    truth = SpeedInputs(true.rho, true.v1, true.alpha1)
+    errors = errors_of(samples.seen, truth, mu1, spacing)
+    bounds = named_bounds(scenario, columns, given)
+    verdict = check(
+        {name: error[known] for name, error in errors.items()},
+        {name: bound[known] for name, bound in bounds.items()},
+    )
+    return result | {"violations": verdict.violations, "tightness": verdict.tightness}
+
+
+def named_bounds(scenario: Scenario, columns: Columns, given: WorstErrors) -> dict[str, FloatArray]:
+    """Every named bound at every sample."""
+    spacing = Spacing(scenario.formation.rho_0, scenario.controller.mu_rho)
+    bounds = all_bounds(
+        columns.samples.seen,
+        given.rates,
+        given.inputs,
+        v_eps=scenario.leader.v_eps,
+        mu1=scenario.controller.mu1,
+        spacing=spacing,
+    )
+    n = len(columns.samples.capture_ns)
+    return {name: np.broadcast_to(bound, (n,)) for name, bound in bounds.items()}
+
+
+def worst_errors(scenario: Scenario, columns: Columns) -> WorstErrors:
+    """Bounds of rate and input errors: of a quantity whose truth is known, the samples' largest error.
+
+    Of any other, the error that the scenario's noise lets assume at each sample's distance.
+    """
+    seen, true = columns.samples.seen, columns.true
+    errors = {
+        "M_rho": seen.rho_dot - true.rho_dot,
+        "M_alpha2": seen.alpha2_dot - true.alpha2_dot,
+        "E_rho": seen.rho - true.rho,
+        "E_alpha2": wrap(np.asarray(seen.alpha2 - true.alpha2)),
+        "E_v2": seen.v2 - true.v2,
+        "E_u2": seen.u2 - true.u2,
+    }
+    largest: dict[str, Values] = {
+        name: float(np.nanmax(np.abs(error))) for name, error in errors.items() if not np.all(np.isnan(error))
+    }
+    if len(largest) < len(errors):
+        largest = _assumed(scenario, columns.samples) | largest
+    return WorstErrors(
+        RateErrors(largest["M_rho"], largest["M_alpha2"]),
+        InputErrors(largest["E_rho"], largest["E_alpha2"], largest["E_v2"], largest["E_u2"]),
+    )
+
+
+def _assumed(scenario: Scenario, samples: EstimateColumns) -> dict[str, Values]:
+    assumed = AssumedErrors.of(scenario)
+    at_each = [assumed.errors(max(rho, _NEAREST)) for rho in np.asarray(samples.seen.rho).tolist()]
+    return {name: np.array([getattr(errors, name) for errors in at_each]) for name in _ERRORS}

@@ -1,0 +1,123 @@
+"""Evidence as arrays, and the estimates that are judged beside their truth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from operator import attrgetter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.bounds import Perceived
+from estimation.tracking import Status
+from formation.angles import FloatArray
+from hil.judge.evidence import Evidence, Span, evaluation_span, run_span
+from hil.judge.true_states import Stamps, TrueStates
+from hil.wire.message_types import Command, LeaderEstimate
+from hil.wire.messages import to_ns
+
+_SEEN = ("rho", "alpha2", "rho_dot", "alpha2_dot", "v1", "alpha1", "v2", "u2")
+_ESTIMATED = attrgetter(*_SEEN, "u1", "nis")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EstimateColumns:
+    """Estimates as arrays of shape (n,), ``sd`` (n, 5) of the quantities in the order of the covariance.
+
+    ``seen`` is what the bounds need of them; units and signs as in ``LeaderEstimate.msg``.
+    """
+
+    capture_ns: Stamps
+    status: NDArray[np.int64]
+    seen: Perceived
+    u1: FloatArray
+    nis: FloatArray
+    sd: FloatArray
+
+    @staticmethod
+    def of(estimates: Sequence[LeaderEstimate]) -> EstimateColumns:
+        """Columns of messages, in their order."""
+        columns = np.array(list(map(_ESTIMATED, estimates)), dtype=np.float64).reshape(-1, 10).T
+        variances = np.array([e.covariance[::6] for e in estimates], dtype=np.float64).reshape(-1, 5)
+        return EstimateColumns(
+            capture_ns=np.array([to_ns(e.header.stamp) for e in estimates], dtype=np.int64),
+            status=np.array([e.status for e in estimates], dtype=np.int64),
+            seen=Perceived(*columns[:8]),
+            u1=columns[8],
+            nis=columns[9],
+            sd=np.sqrt(np.maximum(variances, 0.0)),
+        )
+
+    def only(self, rows: NDArray[np.bool_]) -> EstimateColumns:
+        """The estimates in the given rows."""
+        seen = Perceived(*(np.asarray(getattr(self.seen, name))[rows] for name in _SEEN))
+        return EstimateColumns(
+            capture_ns=self.capture_ns[rows],
+            status=self.status[rows],
+            seen=seen,
+            u1=self.u1[rows],
+            nis=self.nis[rows],
+            sd=self.sd[rows],
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CommandColumns:
+    """Commands as arrays of shape (n,): when issued, the capture behind them, what was sent, and flags."""
+
+    issued_ns: Stamps
+    capture_ns: Stamps
+    v2: FloatArray
+    u2: FloatArray
+    saturated: NDArray[np.bool_]
+    stopped: NDArray[np.bool_]
+    fresh: NDArray[np.bool_]
+
+    @staticmethod
+    def of(commands: Sequence[Command]) -> CommandColumns:
+        """Columns of messages, in their order."""
+        return CommandColumns(
+            issued_ns=np.array([to_ns(c.header.stamp) for c in commands], dtype=np.int64),
+            capture_ns=np.array([to_ns(c.capture) for c in commands], dtype=np.int64),
+            v2=np.array([c.v2 for c in commands], dtype=np.float64),
+            u2=np.array([c.u2 for c in commands], dtype=np.float64),
+            saturated=np.array([c.saturated for c in commands], dtype=np.bool_),
+            stopped=np.array([bool(c.stop) for c in commands], dtype=np.bool_),
+            fresh=np.array([c.fresh for c in commands], dtype=np.bool_),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Columns:
+    """Evidence as columns. ``samples``: the estimates that are judged; ``true``: the truth at each."""
+
+    run: Span
+    span: Span
+    estimates: EstimateColumns
+    commands: CommandColumns
+    truth: TrueStates
+    samples: EstimateColumns
+    true: TrueStates
+
+
+def columns_of(evidence: Evidence) -> Columns:
+    """Columns of evidence. Samples are the estimates marked TRACKING whose capture lies in the evaluation."""
+    run, span = run_span(evidence), evaluation_span(evidence)
+    estimates, truth = EstimateColumns.of(evidence.estimates), TrueStates.of(evidence.truth)
+    judged = inside(estimates.capture_ns, span)
+    samples = estimates.only(judged & (estimates.status == Status.TRACKING))
+    return Columns(
+        run=run,
+        span=span,
+        estimates=estimates,
+        commands=CommandColumns.of(evidence.commands),
+        truth=truth,
+        samples=samples,
+        true=truth.at(samples.capture_ns),
+    )
+
+
+def inside(moments_ns: Stamps, span: Span) -> NDArray[np.bool_]:
+    """Which moments lie within a span, its ends included."""
+    return (moments_ns >= span.from_ns) & (moments_ns <= span.to_ns)

@@ -1,0 +1,138 @@
+"""How good the estimates were: errors against the truth, and against what anybody could have known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from estimation.belief import Model
+from estimation.cramer_rao import TruePath, cramer_rao
+from estimation.estimate import QUANTITIES
+from estimation.measurement import FrontEnd, PoseNoise
+from estimation.motion import LeaderLimits, ProcessNoise
+from estimation.tracking import Status
+from formation.angles import FloatArray, wrap
+from hil.judge.columns import Columns, inside
+from hil.judge.evidence import Evidence, Span
+from hil.scenario.schema import Scenario
+
+WARM_UP_NS = 3_000_000_000
+"""What the Cramer-Rao recursion is given to forget its start: several times its longest memory."""
+
+EVERY = 8
+"""Of so many samples the bound is looked at in one: it moves as slowly as the leader."""
+
+
+def judge_estimation(evidence: Evidence, columns: Columns) -> dict[str, object]:
+    """The ``estimation`` part of a summary.
+
+    ``settle_s``: from the start of the run (the leader sets off, or the first capture) to the capture of the
+    first estimate that says TRACKING. ``nis_mean``: over the samples whose NIS is finite. ``rmse``, ``max``
+    and ``coverage_3sigma`` (the share of errors within three of the estimate's own standard deviations): over
+    the samples at which the quantity's truth is known. ``efficiency``: RMSE over the root mean square of the
+    posterior Cramer-Rao bound at these samples; only for the world front end, whose noise it is about.
+    """
+    samples, estimates = columns.samples, columns.estimates
+    nis = samples.nis[np.isfinite(samples.nis)]
+    judged = int(np.count_nonzero(inside(estimates.capture_ns, columns.span)))
+    errors = estimate_errors(columns)
+    rmse = {name: _rms(error) for name, error in errors.items()}
+    return {
+        "evaluated_from_s": (columns.span.from_ns - evidence.zero_ns) / 1e9,
+        "samples": len(samples.capture_ns),
+        "untracked": judged - len(samples.capture_ns),
+        "settle_s": _settle(columns),
+        "nis_mean": float(nis.mean()) if len(nis) else None,
+        "rmse": rmse,
+        "max": {name: float(np.nanmax(np.abs(error))) for name, error in errors.items()},
+        "efficiency": _efficiency(evidence, columns, rmse),
+        "coverage_3sigma": _coverage(columns, errors),
+    }
+
+
+def estimate_errors(columns: Columns) -> dict[str, FloatArray]:
+    """Estimate minus truth of every sample, by quantity, NaN where the truth is not known.
+
+    Quantities whose truth is known at no sample are left out.
+    """
+    seen, true = columns.samples.seen, columns.true
+    errors = {
+        "rho_dot": seen.rho_dot - true.rho_dot,
+        "alpha2_dot": seen.alpha2_dot - true.alpha2_dot,
+        "v1": seen.v1 - true.v1,
+        "alpha1": wrap(seen.alpha1 - true.alpha1),
+        "u1": columns.samples.u1 - true.u1,
+    }
+    return {name: error for name, error in errors.items() if np.any(np.isfinite(error))}
+
+
+def _settle(columns: Columns) -> float | None:
+    since, estimates = columns.run.from_ns, columns.estimates
+    settled = estimates.capture_ns[(estimates.status == Status.TRACKING) & (estimates.capture_ns >= since)]
+    return float(settled.min() - since) / 1e9 if len(settled) else None
+
+
+def _rms(error: FloatArray) -> float:
+    return math.sqrt(float(np.nanmean(error * error)))
+
+
+def _coverage(columns: Columns, errors: Mapping[str, FloatArray]) -> dict[str, float]:
+    shares: dict[str, float] = {}
+    for name, error in errors.items():
+        sd = columns.samples.sd[:, QUANTITIES.index(name)]
+        known = np.isfinite(error)
+        shares[name] = float(np.mean(np.abs(error[known]) <= 3.0 * sd[known]))
+    return shares
+
+
+def _efficiency(evidence: Evidence, columns: Columns, rmse: Mapping[str, float]) -> dict[str, float]:
+    given = evidence.scenario
+    pose_noise, sd_v2, sd_u2 = _noise(given, emulated=evidence.motion_since_ns is not None)
+    bounded = given.estimator.front_end == "world" and pose_noise.position > 0.0
+    if not bounded or evidence.frames is None or not rmse:
+        return {}
+    truth = columns.truth
+    near = inside(truth.capture_ns, Span(columns.span.from_ns - WARM_UP_NS, columns.span.to_ns))
+    heading = truth.leader[near, 2]
+    leader = np.column_stack(
+        [
+            truth.leader[near, :2],
+            truth.v1[near] * np.cos(heading),
+            truth.v1[near] * np.sin(heading),
+            truth.u1[near],
+        ]
+    )
+    motion = np.column_stack([truth.v2[near], truth.u2[near]])
+    if not np.all(np.isfinite(leader)) or not np.all(np.isfinite(motion)):
+        return {}
+    moments = truth.capture_ns[near]
+    path = TruePath(
+        capture_ns=moments,
+        leader=leader,
+        follower_pose=truth.follower[near],
+        follower_motion=motion,
+        measured=np.isin(moments, np.asarray(evidence.frames.captures_ns, dtype=np.int64)),
+    )
+    at_samples = np.flatnonzero(np.isin(moments, columns.samples.capture_ns))[::EVERY]
+    wanted = np.zeros(len(moments), dtype=np.bool_)
+    wanted[at_samples] = True
+    bounds = cramer_rao(path, _model(given), pose_noise, sd_v2, sd_u2, wanted)
+    best = {name: _rms(bound[np.isfinite(bound)]) for name, bound in bounds.items()}
+    return {name: rmse[name] / best[name] for name in rmse if best[name] > 0.0}
+
+
+def _model(scenario: Scenario) -> Model:
+    limits = LeaderLimits(scenario.leader.v_eps, scenario.leader.k_v, scenario.leader.k_u)
+    return Model(FrontEnd.WORLD, limits, ProcessNoise.by_rule(limits, scenario.estimator.turn_bandwidth))
+
+
+def _noise(scenario: Scenario, *, emulated: bool) -> tuple[PoseNoise, float, float]:
+    """Noise of poses, v2 and u2: what the emulator put in, elsewhere what the estimator assumes."""
+    if emulated:
+        mocap, robot = scenario.mocap, scenario.robot
+        pose_noise = PoseNoise(mocap.sigma_position, mocap.sigma_heading)
+        return pose_noise, robot.odometry_sigma_v, robot.odometry_sigma_u
+    given = scenario.estimator
+    return PoseNoise(given.sigma_position, given.sigma_heading), given.sigma_v2, given.sigma_u2

@@ -1,0 +1,238 @@
+"""What a run leaves behind for its judge: estimates, commands, the truth where it is known, and counts."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import TypeVar
+
+from hil.errors import UsageError
+from hil.log.metadata import mode_of, scenario_of
+from hil.log.reader import Log, Record
+from hil.nodes.node import digest
+from hil.scenario.schema import Scenario
+from hil.wire import topics
+from hil.wire.message_types import Command, DiagnosticArray, LeaderEstimate, Message, RigidBodies, Truth
+from hil.wire.messages import MalformedPayloadError, to_ns
+from hil.wire.topics import Topics, topics_of
+
+IMPORT = "import"
+
+M = TypeVar("M", bound=Message)
+
+
+@dataclass(frozen=True, slots=True)
+class Frames:
+    """Motion-capture frames: when those that the estimator got were captured [ns], each once, in order.
+
+    ``published``: how many were captured from the first to the last of them.
+    """
+
+    published: int
+    captures_ns: Sequence[int]
+
+    @property
+    def received(self) -> int:
+        """How many the estimator got."""
+        return len(self.captures_ns)
+
+
+@dataclass(frozen=True, slots=True)
+class LogFacts:
+    """The log that the evidence comes from: its path, its messages, its size."""
+
+    path: str
+    messages: int
+    bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """All that :func:`hil.judge.summary.summarise` looks at; messages in the order of their publication.
+
+    ``taken``, ``refused``: the estimator's counts, by kind and by cause. ``zero_ns``: where the run's time in
+    seconds counts from. ``motion_since_ns``: when an emulated leader set off, None for other recordings.
+    ``stopped_ns``: when the first stop was ordered, None for none. ``evaluate_from_ns``,
+    ``evaluate_to_ns``: limits of the evaluation that take the place of those in the scenario. ``frames`` and
+    ``log``: None where they are not known.
+
+    A replay is judged on the evidence of its log with its own estimates and counts put in by
+    :func:`dataclasses.replace`.
+    """
+
+    scenario: Scenario
+    mode: str
+    estimates: Sequence[LeaderEstimate]
+    commands: Sequence[Command] = ()
+    truth: Sequence[Truth] = ()
+    taken: Mapping[str, int] = field(default_factory=dict)
+    refused: Mapping[str, int] = field(default_factory=dict)
+    zero_ns: int = 0
+    motion_since_ns: int | None = None
+    stopped_ns: int | None = None
+    evaluate_from_ns: int | None = None
+    evaluate_to_ns: int | None = None
+    frames: Frames | None = None
+    log: LogFacts | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """From when to when, both included [ns]."""
+
+    from_ns: int
+    to_ns: int
+
+    @property
+    def seconds(self) -> float:
+        """Its length [s]."""
+        return (self.to_ns - self.from_ns) / 1e9
+
+
+def run_span(evidence: Evidence) -> Span:
+    """From when the leader set off to the stop or the end of the scenario's duration, whichever is first.
+
+    For a recording in which no emulated leader sets off: from the first to the last of its captures.
+    """
+    captures = _captures(evidence)
+    if evidence.motion_since_ns is None:
+        return Span(min(captures, default=evidence.zero_ns), max(captures, default=evidence.zero_ns))
+    since_ns = evidence.motion_since_ns
+    ends = [since_ns + round(evidence.scenario.run.duration_s * 1e9), max(captures, default=since_ns)]
+    if evidence.stopped_ns is not None:
+        ends.append(evidence.stopped_ns)
+    return Span(since_ns, max(since_ns, min(ends)))
+
+
+def evaluation_span(evidence: Evidence) -> Span:
+    """What is judged: what the evidence asks for, else the run from ``run.evaluate_from_s`` on.
+
+    Of a run that does not last that long the second half is judged.
+    """
+    run = run_span(evidence)
+    to_ns = run.to_ns if evidence.evaluate_to_ns is None else evidence.evaluate_to_ns
+    from_ns = evidence.evaluate_from_ns
+    if from_ns is None:
+        from_ns = evidence.zero_ns + round(evidence.scenario.run.evaluate_from_s * 1e9)
+        if from_ns >= to_ns:
+            from_ns = (run.from_ns + to_ns) // 2
+    return Span(from_ns, to_ns)
+
+
+def evidence_of_log(log: Log, scenario: Scenario | None = None) -> Evidence:
+    """Evidence of what a log recorded, judged by the given scenario or by the log's own.
+
+    Its time in seconds counts from when the leader set off; in an imported log from the source's own zero,
+    and in any other from the first stamp. Raises :class:`UsageError` for a log without a scenario if none is
+    given, and as :meth:`Log.records`. Payloads that are not what their topic promises are left out.
+    """
+    scenario = scenario or scenario_of(log)
+    if scenario is None:
+        raise UsageError(f"log {log.path}: does not tell its scenario; give one, or a map that names one")
+    names = topics_of(scenario)
+    records = _records(log, names)
+    counts = _last_counts(_decoded(log, records[topics.DIAGNOSTICS], DiagnosticArray))
+    estimates = _decoded(log, records[names.estimate], LeaderEstimate)
+    truth = _decoded(log, records[topics.TRUTH], Truth)
+    since = counts.get("emulator", {}).get("motion_since_ns")
+    evidence = Evidence(
+        scenario=scenario,
+        mode=mode_of(log) or IMPORT,
+        estimates=estimates,
+        commands=_decoded(log, records[names.command], Command),
+        truth=truth,
+        taken=_group(counts.get("estimator", {}), "taken"),
+        refused=_group(counts.get("estimator", {}), "refused"),
+        motion_since_ns=None if since is None else int(since),
+        stopped_ns=records[topics.STOP][0].log_ns if records[topics.STOP] else None,
+        frames=_frames(log, records[topics.RIGID_BODIES], estimates, truth),
+        log=LogFacts(str(log.path), log.messages, log.path.stat().st_size),
+    )
+    return replace(evidence, zero_ns=_zero_ns(log, evidence))
+
+
+def _zero_ns(log: Log, evidence: Evidence) -> int:
+    if evidence.motion_since_ns is not None:
+        return evidence.motion_since_ns
+    if mode_of(log) == IMPORT:
+        return 0
+    return min(_captures(evidence), default=log.start_ns or 0)
+
+
+def _captures(evidence: Evidence) -> list[int]:
+    headers = [estimate.header for estimate in evidence.estimates] + [each.header for each in evidence.truth]
+    return [to_ns(header.stamp) for header in headers]
+
+
+def _records(log: Log, names: Topics) -> dict[str, list[Record]]:
+    wanted = (
+        topics.RIGID_BODIES,
+        topics.TRUTH,
+        topics.DIAGNOSTICS,
+        topics.STOP,
+        names.estimate,
+        names.command,
+    )
+    records: dict[str, list[Record]] = {topic: [] for topic in wanted}
+    for record in log.records([topic for topic in wanted if topic in log.topics]):
+        records[record.topic].append(record)
+    return records
+
+
+def _decoded(log: Log, records: Sequence[Record], kind: type[M]) -> list[M]:
+    messages: list[M] = []
+    for record in records:
+        try:
+            message = log.decode(record)
+        except MalformedPayloadError:
+            continue
+        if isinstance(message, kind):
+            messages.append(message)
+    return messages
+
+
+def _last_counts(reports: Sequence[DiagnosticArray]) -> dict[str, dict[str, str]]:
+    """Values of the last report of every node, by the node's name."""
+    return {
+        status.name.removeprefix("abreast/"): {entry.key: entry.value for entry in status.values}
+        for report in reports
+        for status in report.status
+    }
+
+
+def _group(values: Mapping[str, str], group: str) -> dict[str, int]:
+    prefix = f"{group}."
+    return {key.removeprefix(prefix): int(text) for key, text in values.items() if key.startswith(prefix)}
+
+
+def _frames(
+    log: Log, records: Sequence[Record], estimates: Sequence[LeaderEstimate], truth: Sequence[Truth]
+) -> Frames | None:
+    """Frames by their numbers, so that one that came twice counts once; None for fewer than two.
+
+    The estimator got those that its estimates have receipts for. What was captured is known from the truth of
+    an emulated run; elsewhere from the numbers themselves, whose commonest step is taken for that of frames
+    in a row.
+    """
+    got = {receipt.digest for estimate in estimates for receipt in estimate.consumed}
+    taken_in = [record for record in records if digest(record.topic, record.payload) in got]
+    captured = {each.frame_number: to_ns(each.header.stamp) for each in truth}
+    found: dict[int, int] = {}
+    for frame in _decoded(log, taken_in, RigidBodies):
+        try:
+            stamp_ns = to_ns(frame.header.stamp)
+        except MalformedPayloadError:
+            continue  # the estimator refused it too
+        if not captured or captured.get(frame.frame_number) == stamp_ns:
+            found[frame.frame_number] = stamp_ns
+    numbers = sorted(found)
+    if len(numbers) < 2:
+        return None
+    if captured:
+        published = sum(numbers[0] <= number <= numbers[-1] for number in captured)
+    else:
+        steps = Counter(after - before for before, after in pairwise(numbers))
+        published = round((numbers[-1] - numbers[0]) / steps.most_common(1)[0][0]) + 1
+    return Frames(published, sorted(found.values()))

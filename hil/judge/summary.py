@@ -1,0 +1,91 @@
+"""The verdict on a run: from evidence to the JSON of ``run`` and ``replay``."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.judge.bounds import judge_bounds
+from hil.judge.columns import Columns, columns_of
+from hil.judge.estimation import judge_estimation
+from hil.judge.evidence import Evidence
+from hil.judge.formation import judge_formation
+from hil.report_json import known
+
+_STRANGERS = "unknown_body"
+PERCENTILES = {"p50": 50.0, "p99": 99.0, "max": 100.0}
+
+
+def summarise(evidence: Evidence) -> dict[str, Any]:
+    """JSON of ``run`` and ``replay`` without ``parity``; what cannot be known is absent.
+
+    Estimates are judged where they say TRACKING, from ``estimation.evaluated_from_s`` to the stop or the end
+    of the scenario's duration. ``estimation.untracked``: estimates in that time that said anything else.
+    ``frames.rejected``: inputs that were refused, the robots' odometry included; frames that also held
+    strangers do not count. ``commands``: those from when the leader set off to the stop. ``seed`` and ``law``
+    are absent for recordings that were not driven by them.
+    """
+    columns = columns_of(evidence)
+    given = evidence.scenario
+    driven = evidence.motion_since_ns is not None
+    summary = {
+        "scenario": given.name,
+        "seed": given.run.seed if driven else None,
+        "mode": evidence.mode,
+        "estimator": given.estimator.kind,
+        "law": given.controller.law if driven or evidence.commands else None,
+        "duration_s": columns.run.seconds,
+        "frames": _frames(evidence),
+        "estimation": judge_estimation(evidence, columns),
+        "bounds": judge_bounds(given, columns),
+        "formation": judge_formation(evidence, columns),
+        "latency_ms": _latency(columns),
+        "commands": _commands(columns),
+        "rejected": dict(evidence.refused),
+        "log": None if evidence.log is None else asdict(evidence.log),
+    }
+    result: dict[str, Any] = known(summary)
+    return result
+
+
+def _frames(evidence: Evidence) -> dict[str, int | None]:
+    frames, taken = evidence.frames, evidence.taken
+    return {
+        "published": frames.published if frames else None,
+        "received": frames.received if frames else taken.get("frames"),
+        "used": taken.get("used"),
+        "lost": frames.published - frames.received if frames else None,
+        "late": taken.get("late", 0) if taken else None,
+        "rejected": sum(count for cause, count in evidence.refused.items() if cause != _STRANGERS),
+    }
+
+
+def _latency(columns: Columns) -> dict[str, dict[str, float]]:
+    """From the capture of a frame to the first command that rests on it."""
+    commands = columns.commands
+    first = commands.fresh & _in_run(columns)
+    if not np.any(first):
+        return {}
+    waits_ms = (commands.issued_ns - commands.capture_ns)[first] * 1e-6
+    return {
+        "capture_to_command": {name: float(np.percentile(waits_ms, q)) for name, q in PERCENTILES.items()}
+    }
+
+
+def _commands(columns: Columns) -> dict[str, int]:
+    commands, during = columns.commands, _in_run(columns)
+    if not len(commands.issued_ns):
+        return {}
+    return {
+        "sent": int(np.count_nonzero(during)),
+        "saturated": int(np.count_nonzero(commands.saturated & during)),
+        "stopped": int(np.count_nonzero(commands.stopped & during)),
+    }
+
+
+def _in_run(columns: Columns) -> NDArray[np.bool_]:
+    issued_ns = columns.commands.issued_ns
+    return (issued_ns >= columns.run.from_ns) & (issued_ns < columns.run.to_ns)

@@ -1,0 +1,151 @@
+"""What a person reads at the end of a run or a replay: a few lines from its summary."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+GOOD, BAD, PLAIN = "green", "bold red", ""
+LEAST_COVERAGE = 0.97
+"""Of Gaussian errors 99.7 % lie within three standard deviations; below this share they were too small."""
+NIS_RANGE = (1.0, 3.0)
+"""Where the mean NIS of a filter is that knows its noise; 2 is the mean for a position in the plane."""
+LOST_SHARE = 0.01
+SATURATED_SHARE = 0.5
+STOPPED_SHARE = 0.02
+OFF_SHARE = 0.25
+"""A pair that is further off the noise-free run than this share of its least distance is not in formation."""
+
+
+def print_summary(summary: Mapping[str, Any], console: Console | None = None) -> None:
+    """Print a summary, ``parity`` included, to stderr or another console."""
+    console = console or Console(file=sys.stderr)
+    table = Table.grid(padding=(0, 2))
+    for name, finding, style in _lines(summary):
+        table.add_row(Text(name, style="bold"), Text(finding, style=style))
+    console.print(table)
+    for warning in warnings_of(summary):
+        console.print(Text.assemble(("! ", "bold yellow"), warning), soft_wrap=True)
+
+
+def warnings_of(summary: Mapping[str, Any]) -> list[str]:
+    """What deserves a second look, in plain words."""
+    return [*_estimation_warnings(summary), *_formation_warnings(summary), *_wire_warnings(summary)]
+
+
+def _lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Name, finding and style of every line."""
+    made_by = ", ".join(
+        [summary["estimator"]] + ([f"{summary['law']} law"] if "law" in summary else []),
+    )
+    seed = f", seed {summary['seed']}" if "seed" in summary else ""
+    title = f"{summary['scenario']}, {summary['mode']}, {summary['duration_s']:.1f} s ({made_by}{seed})"
+    yield "run", title, PLAIN
+    yield from _estimate_lines(summary)
+    formation = summary.get("formation", {})
+    if "rho_min" in formation:
+        text = f"rho {formation['rho_min']:.3f} to {formation['rho_max']:.3f} m"
+        if "orbit_deviation_rms" in formation:
+            text += f", {1e3 * formation['orbit_deviation_rms']['rho']:.1f} mm RMS off the noise-free run"
+        yield "formation", text, PLAIN
+    yield from _wire_lines(summary)
+    parity = summary.get("parity")
+    if parity is not None:
+        wrong = sum(part["mismatched"] for part in parity.values())
+        compared = sum(part["compared"] for part in parity.values())
+        verdict = f"{compared} messages compared, {wrong} differ"
+        yield "replay", verdict, GOOD if compared and not wrong else BAD
+    if "log" in summary:
+        log = summary["log"]
+        yield "log", f"{log['path']} ({log['messages']} messages, {log['bytes'] / 1e6:.1f} MB)", PLAIN
+
+
+def _estimate_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    estimation, bounds = summary["estimation"], summary["bounds"]
+    rmse = estimation.get("rmse", {})
+    parts = []
+    if "v1" in rmse:
+        parts.append(f"v1 {1e3 * rmse['v1']:.1f} mm/s")
+    if "alpha1" in rmse:
+        parts.append(f"alpha1 {math.degrees(rmse['alpha1']):.2f} deg")
+    if parts:
+        judged = f"({estimation['samples']} samples from {estimation['evaluated_from_s']:.3g} s on)"
+        yield "estimate", f"RMSE {', '.join(parts)} {judged}", PLAIN
+    if "violations" in bounds:
+        broken = extended_violations(summary)
+        tight = max(value for name, value in bounds["tightness"].items() if name.endswith("_extended"))
+        count = f"{sum(broken.values())} times" if broken else "nowhere"
+        verdict = f"extended ones violated {count} in {bounds['checked']} samples (errors up to {tight:.0%})"
+        yield "bounds", verdict, BAD if broken else GOOD
+
+
+def _wire_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    frames = summary.get("frames", {})
+    if "received" in frames:
+        lost = f", {frames['lost']} lost" if "lost" in frames else ""
+        late = f", {frames['late']} late" if frames.get("late") else ""
+        yield "frames", f"{frames['received']} received{lost}{late}", PLAIN
+    latency = summary.get("latency_ms", {}).get("capture_to_command")
+    if latency:
+        text = (
+            f"capture to command {latency['p50']:.1f} ms, p99 {latency['p99']:.1f}, max {latency['max']:.1f}"
+        )
+        yield "latency", text, PLAIN
+
+
+def extended_violations(summary: Mapping[str, Any]) -> dict[str, int]:
+    """Extended bounds that were violated, by name, with the number of samples."""
+    counts = summary["bounds"].get("violations", {})
+    return {name: count for name, count in counts.items() if name.endswith("_extended") and count}
+
+
+def _estimation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
+    estimation = summary["estimation"]
+    samples, untracked = estimation["samples"], estimation.get("untracked", 0)
+    if not samples:
+        yield "nothing to judge: no estimate was marked as tracking in the time that is judged"
+        return
+    if untracked:
+        yield f"{untracked} of {samples + untracked} estimates did not say tracking; they are not judged"
+    low = {
+        name: share
+        for name, share in estimation.get("coverage_3sigma", {}).items()
+        if name in ("v1", "alpha1") and share < LEAST_COVERAGE
+    }
+    for name, share in low.items():
+        yield f"the estimator is too sure of {name}: only {share:.1%} of errors within 3 standard deviations"
+    nis = estimation.get("nis_mean")
+    if nis is not None and not NIS_RANGE[0] <= nis <= NIS_RANGE[1]:
+        noisier = "noisier" if nis > NIS_RANGE[1] else "quieter"
+        yield f"the measurements are {noisier} than the scenario says (mean NIS {nis:.2g}, expected 2)"
+    for name, count in extended_violations(summary).items():
+        yield f"bound {name} does not hold in {count} samples: check the noise and leader limits it rests on"
+
+
+def _formation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
+    formation, commands = summary.get("formation", {}), summary.get("commands", {})
+    off = formation.get("orbit_deviation_rms", {}).get("rho", 0.0)
+    if off > OFF_SHARE * formation.get("rho_min", math.inf):
+        yield f"the formation is not kept: the distance is {off:.2g} m RMS off the noise-free run"
+    sent = commands.get("sent", 0)
+    if commands.get("stopped", 0) > STOPPED_SHARE * sent:
+        yield f"in {commands['stopped'] / sent:.0%} of the commands the robot was told to stand still"
+    if commands.get("saturated", 0) > SATURATED_SHARE * sent:
+        yield f"{commands['saturated'] / sent:.0%} of the commands were at a limit of the robot"
+
+
+def _wire_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
+    frames = summary.get("frames", {})
+    lost, published = frames.get("lost", 0), frames.get("published", 0)
+    if lost > LOST_SHARE * published:
+        yield f"{lost / published:.1%} of the frames never reached the estimator"
+    rejected = summary.get("rejected", {})
+    if rejected:
+        causes = ", ".join(f"{cause.replace('_', ' ')} {count}" for cause, count in sorted(rejected.items()))
+        yield f"inputs refused: {causes}"

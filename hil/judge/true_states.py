@@ -1,0 +1,104 @@
+"""The truth of a run as arrays, at the moments of its messages and in between."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from operator import attrgetter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from formation.angles import FloatArray, wrap
+from formation.pose import Motion, Pose
+from formation.shape import shape_of, shape_rates
+from hil.wire.message_types import Truth
+from hil.wire.messages import to_ns
+
+LONGEST_GAP_NS = 500_000_000
+"""Truths that are further apart than this say nothing of what lies between them."""
+
+Stamps = NDArray[np.int64]
+
+_POSES = ("leader_x", "leader_y", "leader_theta", "follower_x", "follower_y", "follower_theta")
+_TOLD = attrgetter(*_POSES, "v1", "u1", "v2", "u2")
+_TOLD_SIZE, _SHAPE_SIZE = 10, 5
+_HEADINGS = [2, 5]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrueStates:
+    """The truth at n moments: arrays of shape (n,), the poses ``leader`` and ``follower`` (n, 3) x, y, theta.
+
+    NaN where something is not known. Moments increase. Shape and rates follow from poses and motions.
+    """
+
+    capture_ns: Stamps
+    leader: FloatArray
+    follower: FloatArray
+    v1: FloatArray
+    u1: FloatArray
+    v2: FloatArray
+    u2: FloatArray
+    rho: FloatArray
+    alpha1: FloatArray
+    alpha2: FloatArray
+    rho_dot: FloatArray
+    alpha2_dot: FloatArray
+
+    @staticmethod
+    def of(truth: Sequence[Truth]) -> TrueStates:
+        """Columns of messages in the order of their stamps; of several with one stamp the first counts."""
+        told = np.array(list(map(_TOLD, truth)), dtype=np.float64).reshape(-1, _TOLD_SIZE)
+        stamps = np.array([to_ns(each.header.stamp) for each in truth], dtype=np.int64)
+        moments_ns, first = np.unique(stamps, return_index=True)
+        return _states(moments_ns, _with_shape(told[first]))
+
+    def at(self, moments_ns: Stamps) -> TrueStates:
+        """The truth at other moments: exact where there is one, else linear between its neighbours.
+
+        Headings turn the short way round the circle. Unknown outside, and between neighbours that are more
+        than :data:`LONGEST_GAP_NS` apart.
+        """
+        known = self._rows()
+        rows = np.full((len(moments_ns), _TOLD_SIZE + _SHAPE_SIZE), math.nan)
+        if len(known):
+            after = np.searchsorted(self.capture_ns, moments_ns)
+            here, before = np.minimum(after, len(known) - 1), np.maximum(after - 1, 0)
+            exact = self.capture_ns[here] == moments_ns
+            rows[exact] = known[here[exact]]
+            gap_ns = self.capture_ns[here] - self.capture_ns[before]
+            between = ~exact & (after > 0) & (after < len(known)) & (gap_ns <= LONGEST_GAP_NS)
+            share = (moments_ns - self.capture_ns[before])[between] / gap_ns[between]
+            first, second = known[before[between], :_TOLD_SIZE], known[here[between], :_TOLD_SIZE]
+            change = second - first
+            change[:, _HEADINGS] = wrap(change[:, _HEADINGS])
+            rows[between] = _with_shape(first + share[:, np.newaxis] * change)
+        return _states(moments_ns, rows)
+
+    def _rows(self) -> FloatArray:
+        motions = (self.v1, self.u1, self.v2, self.u2)
+        shapes = (self.rho, self.alpha1, self.alpha2, self.rho_dot, self.alpha2_dot)
+        return np.column_stack([self.leader, self.follower, *motions, *shapes])
+
+
+def _states(moments_ns: Stamps, rows: FloatArray) -> TrueStates:
+    return TrueStates(moments_ns, rows[:, 0:3], rows[:, 3:6], *rows[:, 6:].T)
+
+
+def _with_shape(told: FloatArray) -> FloatArray:
+    """Rows of both poses and both motions with the shape and its rates behind."""
+    told[:, _HEADINGS] = wrap(told[:, _HEADINGS])
+    shapes = np.array(list(map(_shape_and_rates, told.tolist())), dtype=np.float64)
+    return np.column_stack([told, shapes.reshape(-1, _SHAPE_SIZE)])
+
+
+def _shape_and_rates(told: list[float]) -> tuple[float, float, float, float, float]:
+    lx, ly, ltheta, fx, fy, ftheta, v1, u1, v2, u2 = told
+    try:
+        shape = shape_of(Pose(lx, ly, ltheta), Pose(fx, fy, ftheta))
+    except ValueError:  # both in one place: there is no shape
+        return math.nan, math.nan, math.nan, math.nan, math.nan
+    rates = shape_rates(shape, Motion(v1, u1), Motion(v2, u2))
+    return shape.rho, shape.alpha1, shape.alpha2, rates.rho_dot, rates.alpha2_dot

@@ -1,0 +1,1 @@
+"""Daemons as processes over Zenoh, their supervisor and the recorder."""

@@ -1,0 +1,151 @@
+"""A node, live: the wire and the clock on one side, the pure step on the other."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from types import FrameType
+from typing import Any, Protocol
+
+from hil.nodes.node import TICK, Event, Node, Outgoing, outgoing
+from hil.wire import topics
+from hil.wire.message_types import String
+from hil.wire.pubsub import Wire
+from hil.wire.session import Endpoints, close_session, open_session
+from hil.wire.topics import Topics
+
+_LONGEST_WAIT = 0.1
+_LINGER = 0.05
+
+
+class Worker(Protocol):
+    """What a daemon does with what arrives."""
+
+    subscribes: tuple[str, ...]
+
+    def begin(self, now_ns: int) -> None:
+        """Come up."""
+
+    def due_ns(self) -> int:
+        """When the worker wants to be woken if nothing arrives before."""
+
+    def take(self, event: Event, now_ns: int) -> tuple[Outgoing, ...]:
+        """Deal with an arrival or a tick; what to publish."""
+
+    def end(self, now_ns: int) -> tuple[Outgoing, ...]:
+        """Last words."""
+
+
+class NodeWorker:
+    """Carries a node's state from step to step.
+
+    With ``parting`` the node is told to stop before it leaves, by the same stop message that all others get:
+    so a controller's last command is a standstill, and the log holds the reason.
+    """
+
+    def __init__(self, node: Node[Any], parting: str = "") -> None:
+        self.node = node
+        self.subscribes = node.subscribes
+        self._parting = parting
+        self._state: Any = None
+
+    def begin(self, now_ns: int) -> None:
+        """Let the node come up."""
+        self._state = self.node.begin(now_ns)
+
+    def due_ns(self) -> int:
+        """Time of the node's next tick."""
+        return self.node.due_ns(self._state)
+
+    def take(self, event: Event, now_ns: int) -> tuple[Outgoing, ...]:
+        """One step."""
+        self._state, out = self.node.step(self._state, event, now_ns)
+        return out
+
+    def end(self, now_ns: int) -> tuple[Outgoing, ...]:
+        """The parting stop, if any, and the node's final report."""
+        out: tuple[Outgoing, ...] = ()
+        if self._parting:
+            stop = outgoing(topics.STOP, String(data=self._parting), now_ns)
+            out = (stop, *self.take(Event(stop.topic, stop.payload), now_ns))
+        return (*out, self.node.report(self._state, now_ns))
+
+
+class Ending:
+    """Whether the process was asked to end: by a signal, by its duration, or by its parent going away."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._wakers: list[Callable[[], None]] = []
+
+    def ask(self) -> None:
+        """Ask for the end."""
+        self.asked = True
+        for wake in self._wakers:
+            wake()
+
+    def notify(self, wake: Callable[[], None]) -> None:
+        """Call ``wake`` when the end is asked for."""
+        self._wakers.append(wake)
+
+    def on_signals(self) -> None:
+        """Let SIGINT and SIGTERM ask for the end."""
+
+        def handle(_number: int, _frame: FrameType | None) -> None:
+            self.ask()
+
+        signal.signal(signal.SIGINT, handle)
+        signal.signal(signal.SIGTERM, handle)
+
+    def on_parent_gone(self) -> None:
+        """Let the closing of standard input ask for the end: the parent holds its other side."""
+
+        def watch() -> None:
+            while os.read(0, 1):
+                pass
+            self.ask()
+
+        threading.Thread(target=watch, daemon=True).start()
+
+
+def run_daemon(
+    make_worker: Callable[[], Worker],
+    names: Topics,
+    endpoints: Endpoints,
+    ending: Ending,
+    duration_s: float | None = None,
+    on_ready: Callable[[], None] = lambda: None,
+) -> None:
+    """Run a worker on the wire until the end is asked for or ``duration_s`` is over.
+
+    The worker is made once the wire is there; ``on_ready`` is called when it is subscribed. Events are taken
+    one at a time in order of arrival; ``now`` is the host clock when one is taken.
+    """
+    session = open_session(endpoints, give_up=lambda: ending.asked)
+    wire = Wire(session, urgent=(names.cmd_vel, topics.STOP))
+    try:
+        ending.notify(wire.wake)
+        worker = make_worker()
+        worker.begin(time.time_ns())
+        wire.subscribe(worker.subscribes)
+        on_ready()
+        until = None if duration_s is None else time.monotonic() + duration_s
+        while not ending.asked and (until is None or time.monotonic() < until):
+            wait = min((worker.due_ns() - time.time_ns()) * 1e-9, _LONGEST_WAIT)
+            event = wire.inbox.take(wait)
+            now_ns = time.time_ns()
+            if event is not None or now_ns >= worker.due_ns():
+                _publish(wire, worker.take(event or TICK, now_ns))
+        _publish(wire, worker.end(time.time_ns()))
+        time.sleep(_LINGER)
+    finally:
+        wire.close()
+        close_session(session)
+
+
+def _publish(wire: Wire, messages: tuple[Outgoing, ...]) -> None:
+    for message in messages:
+        wire.publish(message.topic, message.payload)

@@ -1,0 +1,82 @@
+"""The recorder: everything on the wire into one log, what cannot be decoded included."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from hil.log.metadata import log_metadata
+from hil.log.writer import LogWriter
+from hil.nodes.node import Event, Outgoing, counted, diagnostics, named_counts, no_counts, outgoing
+from hil.scenario.schema import Scenario
+from hil.wire import topics
+from hil.wire.message_types import Malformed
+from hil.wire.messages import MalformedPayloadError, decode, encode, header, typename_of
+from hil.wire.topics import topics_of
+
+NAME = "recorder"
+_FLUSH_NS = 100_000_000
+_DIAGNOSTICS_NS = 500_000_000
+
+
+class Recorder:
+    """Writes each payload with its time of arrival. A worker of :mod:`hil.live.daemon`.
+
+    A payload that is not a valid message of its topic's type would make the log unreadable for others: it
+    goes to the topic ``malformed``, byte for byte.
+    """
+
+    def __init__(self, scenario: Scenario, path: Path) -> None:
+        self._types = topics_of(scenario).types
+        self.subscribes = tuple(topic for topic in self._types if topic != topics.MALFORMED)
+        self._log = LogWriter(path, log_metadata(scenario, "live"))
+        self._counts = no_counts()
+        self._next_flush_ns = 0
+        self._next_report_ns = 0
+
+    def begin(self, now_ns: int) -> None:
+        """Start the timers."""
+        self._next_flush_ns = self._next_report_ns = now_ns
+
+    def due_ns(self) -> int:
+        """Time of the next flush: what was written before it survives a kill."""
+        return self._next_flush_ns
+
+    def take(self, event: Event, now_ns: int) -> tuple[Outgoing, ...]:
+        """Write an arrival, or flush."""
+        if event.topic:
+            self._write(event, now_ns)
+        if now_ns < self._next_flush_ns:
+            return ()
+        self._log.flush()
+        self._next_flush_ns = now_ns + _FLUSH_NS
+        if now_ns < self._next_report_ns:
+            return ()
+        self._next_report_ns = now_ns + _DIAGNOSTICS_NS
+        return (self._report(now_ns),)
+
+    def end(self, now_ns: int) -> tuple[Outgoing, ...]:
+        """Write the recorder's own last report and finish the file."""
+        report = self._report(now_ns)
+        self._log.write(report.topic, report.typename, report.payload, now_ns, now_ns)
+        self.close()
+        return ()
+
+    def close(self) -> None:
+        """Finish the file; safe to call again."""
+        self._log.close()
+
+    def _write(self, event: Event, now_ns: int) -> None:
+        topic, typename, payload = event.topic, self._types[event.topic], event.payload
+        try:
+            decode(payload, typename)
+        except MalformedPayloadError:
+            self._counts = counted(self._counts, topic)
+            kept = Malformed(header(now_ns, ""), topic, np.frombuffer(payload, dtype=np.uint8))
+            topic, typename, payload = topics.MALFORMED, typename_of(Malformed), encode(kept)
+        self._log.write(topic, typename, payload, now_ns, now_ns)
+
+    def _report(self, now_ns: int) -> Outgoing:
+        values = {"messages": self._log.messages, **named_counts("malformed", self._counts)}
+        return outgoing(topics.DIAGNOSTICS, diagnostics(NAME, now_ns, "", values), now_ns)

@@ -1,0 +1,137 @@
+"""A live run: a router, four daemons as processes, and a supervisor that stops the robots if one fails."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from formation.pose import STANDSTILL
+from hil.live.child_processes import Children
+from hil.live.daemon import Ending
+from hil.live.watch import Picture, Watch
+from hil.scenario.files import scenario_text
+from hil.scenario.schema import Scenario
+from hil.wire import message_types as msg
+from hil.wire import topics
+from hil.wire.drive_message import drive_message
+from hil.wire.messages import encode
+from hil.wire.pubsub import Wire
+from hil.wire.session import Endpoints, close_session, open_session
+from hil.wire.topics import topics_of
+
+DAEMONS = ("recorder", "estimator", "controller", "emulator")
+START_TIMEOUT = 30.0
+SILENCE = 3.0
+STANDSTILL_TIMEOUT = 2.0
+_GLANCE = 0.05
+
+Show = Callable[[Picture, float | None], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a live run ended: what failed (empty: nothing), whether it was interrupted, how long it drove."""
+
+    failure: str
+    interrupted: bool
+    duration_s: float
+
+
+def run_live(
+    scenario: Scenario, folder: Path, log_path: Path, endpoint: str, ending: Ending, show: Show
+) -> Outcome:
+    """Run a scenario live for its duration, or until the end is asked for, or until a daemon fails.
+
+    The router listens on ``endpoint``, where others may connect too.
+    ``show`` gets the picture of the run and the time since the leader set off (None before), some 20 times a
+    second. However it ends, the robots are stopped, the log is finished and no process is left.
+    """
+    router = open_session(Endpoints(listen=endpoint))
+    supervisor = _Supervisor(scenario, folder, log_path, endpoint)
+    try:
+        return supervisor.run(ending, show)
+    finally:
+        supervisor.close()
+        close_session(router)
+
+
+class _Supervisor:
+    def __init__(self, scenario: Scenario, folder: Path, log_path: Path, endpoint: str) -> None:
+        self._scenario = scenario
+        self._names = topics_of(scenario)
+        self._session = open_session(Endpoints(connect=endpoint))
+        self._wire = Wire(self._session, urgent=(self._names.cmd_vel, topics.STOP))
+        self._watch = Watch(self._session, self._names)
+        self._children = Children(folder)
+        resolved = folder / "scenario.toml"
+        resolved.write_text(scenario_text(scenario), encoding="utf-8")
+        extra = {
+            "recorder": ["--out", str(log_path)],
+            "emulator": ["--needs", "estimator,controller,recorder"],
+        }
+        for name in DAEMONS:
+            self._children.start(name, [str(resolved), "--connect", endpoint, *extra.get(name, [])])
+
+    def run(self, ending: Ending, show: Show) -> Outcome:
+        begun = time.monotonic()
+        set_off: float | None = None
+        failure = ""
+        duration = self._scenario.run.duration_s
+        while not (ending.asked or failure):
+            failure = self._failure(_GLANCE)
+            picture = self._watch.look()
+            now = time.monotonic()
+            if set_off is None and picture.motion_since_ns is not None:
+                set_off = now - (time.time_ns() - picture.motion_since_ns) * 1e-9
+            if set_off is None and now - begun > START_TIMEOUT:
+                failure = f"the start barrier did not open within {START_TIMEOUT:g} s: {_waiting(picture)}"
+            show(picture, None if set_off is None else now - set_off)
+            if set_off is not None and now - set_off >= duration:
+                break
+        driven = 0.0 if set_off is None else min(time.monotonic() - set_off, duration)
+        self._stop(failure or ("interrupted" if ending.asked else "end of run"))
+        return Outcome(failure, ending.asked, driven)
+
+    def close(self) -> None:
+        """Controller first, its last word being a standstill; recorder last, so that nothing is missed."""
+        self._children.end(["controller", "estimator"])
+        self._children.end(["emulator"])
+        self._children.end(["recorder"])
+        self._children.close()
+        self._watch.close()
+        self._wire.close()
+        close_session(self._session)
+
+    def _failure(self, timeout: float) -> str:
+        """What has gone wrong, if anything, within ``timeout`` [s]."""
+        ended = self._children.wait_for_end_of_any(timeout)
+        if ended is not None:
+            words = ended.last_words()
+            code = ended.process.wait()
+            how = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
+            return f"the {ended.name} {how}" + (f": {words}" if code > 0 and words else "")
+        silent = self._watch.picture.silent(DAEMONS, SILENCE)
+        return f"the {silent} has said nothing for {SILENCE:g} s" if silent else ""
+
+    def _stop(self, reason: str) -> None:
+        """Stop everybody, speak for a controller that may be gone, and wait until the robots stand."""
+        self._wire.publish(topics.STOP, encode(msg.String(data=reason)))
+        self._wire.publish(self._names.cmd_vel, encode(self._standstill()))
+        deadline = time.monotonic() + STANDSTILL_TIMEOUT
+        while time.monotonic() < deadline and not self._watch.look().standing:
+            time.sleep(_GLANCE)
+        time.sleep(_GLANCE)
+
+    def _standstill(self) -> msg.Message:
+        return drive_message(STANDSTILL, time.time_ns(), self._names.follower, stamped=self._names.stamped)
+
+
+def _waiting(picture: Picture) -> str:
+    """What the start barrier waits for, in words."""
+    unheard = [name for name in DAEMONS if name not in picture.heard]
+    if unheard:
+        return f"nothing was heard of {', '.join(unheard)}"
+    problems = [f"{name}: {problem}" for name, problem in picture.problems.items() if problem]
+    return "; ".join(problems) or "no daemon says why"

@@ -1,0 +1,1 @@
+"""Logs: MCAP files written, read, recovered."""

@@ -1,0 +1,218 @@
+"""Reading logs: our own and the MCAP files of rosbag2."""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.exceptions import McapError
+from mcap.reader import McapReader, NonSeekingReader, SeekingReader
+from mcap.records import Channel, Schema
+from mcap.records import Message as McapMessage
+from mcap.stream_reader import StreamReader
+from zstandard import ZstdError
+
+from hil.errors import UsageError
+from hil.log.mcap_chunks import MAGIC
+from hil.wire.message_types import Message
+from hil.wire.messages import decode, typestore_of
+
+DAMAGE = (
+    McapError,
+    ZstdError,
+    struct.error,
+    ValueError,
+    KeyError,
+    OverflowError,
+    RuntimeError,
+    MemoryError,
+)
+"""What the ``mcap`` package and the decompressors raise on bytes that are not as they were written."""
+
+_SHORTEST_BYTES = 2 * len(MAGIC) + 17 + 29
+"""Size of an MCAP with nothing but a header (without texts) and a footer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One logged message: its CDR payload, when it was logged and published, its number on its topic."""
+
+    topic: str
+    typename: str
+    payload: bytes
+    log_ns: int
+    publish_ns: int
+    sequence: int
+
+
+@dataclass(frozen=True, slots=True)
+class Log:
+    """A whole log, by :func:`read_log`.
+
+    ``metadata``: metadata records by name. ``topics``: type name by topic. ``encodings``: message encoding
+    by topic. ``definitions``: ``ros2msg`` text by type name, where the log has one. ``messages``: how many
+    there are, from ``start_ns`` to ``end_ns`` in log time (both None in a log without messages).
+    """
+
+    path: Path
+    metadata: Mapping[str, Mapping[str, str]]
+    topics: Mapping[str, str]
+    encodings: Mapping[str, str]
+    definitions: Mapping[str, str]
+    messages: int
+    start_ns: int | None
+    end_ns: int | None
+    indexed: bool
+
+    def records(
+        self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
+    ) -> Iterator[Record]:
+        """Yield the messages in the order of log time, those of equal time in the order of the file.
+
+        Only those of the given topics (None: all) logged at ``start_ns`` or later and before ``end_ns``.
+        Raises :class:`UsageError` if the log is damaged, or if a topic is not encoded as CDR.
+        """
+        for topic in self.topics if topics is None else topics:
+            encoding = self.encodings.get(topic, "cdr")
+            if encoding != "cdr":
+                raise UsageError(
+                    f"log {self.path}: topic {topic!r} is encoded as {encoding!r}, expected 'cdr'; "
+                    "convert the log to ROS 2 or leave the topic out"
+                )
+        if start_ns is not None and end_ns is not None and end_ns <= start_ns:
+            return
+        with _reading(self.path) as stream:
+            reader: McapReader = (
+                SeekingReader(stream, validate_crcs=True)
+                if self.indexed
+                else NonSeekingReader(stream, validate_crcs=True)
+            )
+            for schema, channel, message in reader.iter_messages(
+                topics=topics, starting_at=start_ns, ending_before=end_ns
+            ):
+                yield Record(
+                    channel.topic,
+                    _typename(schema),
+                    message.data,
+                    message.log_time,
+                    message.publish_time,
+                    message.sequence,
+                )
+
+    def decode(self, record: Record) -> Message:
+        """Return the record's message, by the log's own definition of its type where it has one.
+
+        Raises what `hil.wire.messages.decode` raises.
+        """
+        text = self.definitions.get(record.typename)
+        return decode(record.payload, record.typename, typestore_of(record.typename, text) if text else None)
+
+
+def read_log(path: Path) -> Log:
+    """Open a log: check that it is whole, and read all but its messages.
+
+    Raises :class:`UsageError` if it is missing, a folder, not MCAP, cut off or damaged.
+    """
+    check_mcap(path)
+    with _reading(path) as stream:
+        _refuse_cut_off(stream, path)
+        reader = SeekingReader(stream)
+        summary = reader.get_summary()
+        indexed = bool(summary and summary.statistics and summary.channels and summary.schemas)
+        if summary is not None and summary.statistics is not None and indexed:
+            schemas, channels = summary.schemas, summary.channels
+            messages = summary.statistics.message_count
+            start_ns, end_ns = summary.statistics.message_start_time, summary.statistics.message_end_time
+        else:
+            schemas, channels, messages, start_ns, end_ns = _scan(stream)
+        stream.seek(0)
+        metadata = {record.name: dict(record.metadata) for record in SeekingReader(stream).iter_metadata()}
+        ordered = [channels[number] for number in sorted(channels)]
+        return Log(
+            path=path,
+            metadata=metadata,
+            topics={channel.topic: _typename(schemas.get(channel.schema_id)) for channel in ordered},
+            encodings={channel.topic: channel.message_encoding for channel in ordered},
+            definitions={
+                _typename(schema): schema.data.decode()
+                for schema in schemas.values()
+                if schema.encoding == "ros2msg" and schema.data
+            },
+            messages=messages,
+            start_ns=start_ns if messages else None,
+            end_ns=end_ns if messages else None,
+            indexed=indexed,
+        )
+
+
+def check_mcap(path: Path) -> None:
+    """Raise :class:`UsageError` unless the path is a file that begins as MCAP does."""
+    if path.is_dir():
+        inside = sorted(path.glob("*.mcap"))
+        hint = f"give the file in it: {inside[0]}" if inside else "expected an MCAP file"
+        raise UsageError(f"log {path}: is a folder; {hint}")
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(len(MAGIC))
+    except FileNotFoundError:
+        raise UsageError(f"log {path}: no such file; check the path") from None
+    except OSError as error:
+        raise UsageError(f"log {path}: cannot be read ({error.strerror})") from None
+    if not start:
+        raise UsageError(f"log {path}: is empty; expected an MCAP file")
+    if start != MAGIC:
+        raise UsageError(
+            f"log {path}: is not MCAP (it begins with {start!r}); expected a log or a rosbag2 MCAP"
+        )
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[BinaryIO]:
+    try:
+        with path.open("rb") as stream:
+            yield stream
+    except OSError as error:
+        raise UsageError(f"log {path}: cannot be read ({error.strerror or error})") from None
+    except DAMAGE as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise UsageError(
+            f"log {path}: is damaged ({reason}); save what is whole with: abreast recover"
+        ) from None
+
+
+def _refuse_cut_off(stream: BinaryIO, path: Path) -> None:
+    size = stream.seek(0, os.SEEK_END)
+    stream.seek(max(0, size - len(MAGIC)))
+    if size < _SHORTEST_BYTES or stream.read() != MAGIC:
+        raise UsageError(f"log {path}: is cut off; make it whole with: abreast recover {path} --out LOG")
+    stream.seek(0)
+
+
+def _scan(stream: BinaryIO) -> tuple[dict[int, Schema], dict[int, Channel], int, int, int]:
+    """Return schemas, channels, message count and first and last log time of a log without a summary."""
+    stream.seek(0)
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Channel] = {}
+    messages, first, last = 0, 2**64, 0
+    for record in StreamReader(stream).records:
+        if isinstance(record, Schema):
+            schemas[record.id] = record
+        elif isinstance(record, Channel):
+            channels[record.id] = record
+        elif isinstance(record, McapMessage):
+            messages += 1
+            first, last = min(first, record.log_time), max(last, record.log_time)
+    return schemas, channels, messages, first, last
+
+
+def _typename(schema: Schema | None) -> str:
+    """Return the schema's type as ``package/msg/Name``; ROS 1 and early rosbag2 leave ``msg`` out."""
+    if schema is None:
+        return ""
+    package, slash, name = schema.name.partition("/")
+    return schema.name if "/" in name or not slash else f"{package}/msg/{name}"

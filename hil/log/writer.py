@@ -1,0 +1,120 @@
+"""Writing a run's log: MCAP with ROS 2 messages, safe against a kill, same messages giving same bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from hil import __version__
+from hil.errors import AbreastError, UsageError
+from hil.log.mcap_chunks import ChunkedMcap
+from hil.wire.messages import definition, rihs01
+
+LIBRARY = f"abreast {__version__}"
+"""What our logs name as the software that wrote them."""
+
+_CHUNK_LIMIT_BYTES = 1 << 20
+
+
+class LogWriter:
+    """A log open for writing. Use as a context manager, or call :meth:`close`.
+
+    The metadata records (name to entries) come first in the file, so that a log that was cut off has them.
+    Messages reach the operating system at the latest when log time has moved ``flush_every_s`` on; as no
+    clock is looked at, a writer whose messages cease for a while should call :meth:`flush`. Not for use from
+    several threads.
+
+    Raises :class:`UsageError` if the file exists or can't be created, and :class:`AbreastError` from any
+    method once the disk refuses to take more; what was written before stays recoverable.
+    """
+
+    def __init__(
+        self, path: Path, metadata: Mapping[str, Mapping[str, str]], flush_every_s: float = 0.1
+    ) -> None:
+        self.path = path
+        self.messages = 0
+        self._flush_every_ns = round(flush_every_s * 1e9)
+        self._chunk_from_ns: int | None = None
+        self._schema_ids: dict[str, int] = {}
+        self._channel_ids: dict[tuple[str, str], int] = {}
+        self._failed = False
+        try:
+            self._file = path.open("xb", buffering=0)
+        except FileExistsError:
+            raise UsageError(f"log {path}: exists already; give another name or move it away") from None
+        except OSError as error:
+            raise UsageError(
+                f"log {path}: cannot be written ({error.strerror}); give another place"
+            ) from None
+        try:
+            self._mcap = ChunkedMcap(self._emit, profile="ros2", library=LIBRARY)
+            for name, entries in metadata.items():
+                self._mcap.add_metadata(name, entries)
+        except AbreastError:
+            self._file.close()
+            raise
+
+    def write(self, topic: str, typename: str, payload: bytes, log_ns: int, publish_ns: int) -> None:
+        """Append a message: CDR payload, when it was logged and when it was published."""
+        channel_id = self._channel_ids.get((topic, typename))
+        if channel_id is None:
+            channel_id = self._declare(topic, typename)
+        self._mcap.add_message(channel_id, log_ns, publish_ns, payload)
+        self.messages += 1
+        if self._chunk_from_ns is None:
+            self._chunk_from_ns = log_ns
+        # Log times of different topics need not be in order, so the distance counts, not the sign.
+        if (
+            abs(log_ns - self._chunk_from_ns) >= self._flush_every_ns
+            or self._mcap.open_chunk_bytes >= _CHUNK_LIMIT_BYTES
+        ):
+            self.flush()
+
+    def flush(self) -> None:
+        """Hand everything written so far to the operating system: it then survives a kill of the process."""
+        self._mcap.close_chunk()
+        self._chunk_from_ns = None
+
+    def close(self) -> None:
+        """Finish the file; further calls do nothing."""
+        if self._file.closed:
+            return
+        try:
+            if not self._failed:
+                self._mcap.finish()
+        finally:
+            self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _declare(self, topic: str, typename: str) -> int:
+        if typename not in self._schema_ids:
+            text = definition(typename).encode()
+            self._schema_ids[typename] = self._mcap.add_schema(typename, "ros2msg", text)
+        # ROS 2 tools read these two keys; an empty list of profiles makes `ros2 bag play` use its default.
+        metadata = {"offered_qos_profiles": "[]", "topic_type_hash": rihs01(typename)}
+        channel_id = self._mcap.add_channel(topic, self._schema_ids[typename], "cdr", metadata)
+        self._channel_ids[topic, typename] = channel_id
+        return channel_id
+
+    def _emit(self, data: bytes) -> None:
+        if self._failed:
+            raise AbreastError(f"log {self.path}: given up after an earlier write error")
+        try:
+            rest = memoryview(data)
+            while rest:
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            self._failed = True
+            reason = error.strerror or str(error)
+            raise AbreastError(
+                f"log {self.path}: writing failed ({reason}); what came before is there for: abreast recover"
+            ) from error

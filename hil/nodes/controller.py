@@ -1,0 +1,233 @@
+"""The controller daemon: estimates in, commands out; it predicts, asks the law, and lets the guard decide."""
+
+from __future__ import annotations
+
+import math
+
+from msgspec import Struct, field
+from msgspec.structs import replace
+
+from controllers.guard import Decision, decide
+from controllers.laws import LAWS
+from estimation.estimate import Estimate
+from estimation.prediction import SentCommand, predict_shape
+from estimation.tracking import Status
+from formation.pose import Motion
+from hil.nodes.node import (
+    Counts,
+    Event,
+    Outgoing,
+    consumed,
+    counted,
+    diagnostics,
+    named_counts,
+    no_counts,
+    outgoing,
+)
+from hil.scenario.parts import gains, limits
+from hil.scenario.schema import Scenario
+from hil.wire import message_types as msg
+from hil.wire import topics
+from hil.wire.drive_message import drive_message, read_drive
+from hil.wire.estimate_message import from_message
+from hil.wire.intake import CLOCK_TOLERANCE_NS
+from hil.wire.messages import MalformedPayloadError, decode_as, header, to_time
+from hil.wire.topics import topics_of
+
+NAME = "controller"
+_DIAGNOSTICS_NS = 500_000_000
+_NS = 1e-9
+_LARGEST = 1e6
+
+
+class ControllerState(Struct, frozen=True):
+    """All that the controller remembers.
+
+    ``estimate``: the newest one that may move the robot; ``status``: of the newest one of any kind.
+    ``sent``: commands since that estimate's capture, oldest first, and the one before. ``leader_u1``: the
+    turn rate that the leader was told to drive, kept for the law ``ideal``, nan before it is known.
+    """
+
+    estimate: Estimate | None = None
+    status: Status = Status.INITIALISING
+    stopped: bool = False
+    sent: tuple[SentCommand, ...] = ()
+    receipts: tuple[msg.Consumed, ...] = ()
+    refused: Counts = field(default_factory=no_counts)
+    decided: Counts = field(default_factory=no_counts)
+    heard: bool = False
+    leader_u1: float = math.nan
+    next_tick_ns: int = 0
+    next_diagnostics_ns: int = 0
+
+
+class ControllerNode:
+    """Pure step of the controller daemon."""
+
+    name = NAME
+
+    def __init__(self, scenario: Scenario) -> None:
+        given = scenario.controller
+        self.topics = topics_of(scenario)
+        self.law = LAWS[given.law]
+        self.gains, self.limits = gains(scenario), limits(scenario)
+        self.max_age = given.max_age_s
+        self.lag = given.lag_s
+        self.transport_ns = round(given.transport_s / _NS)
+        self.ahead_ns = self.transport_ns + round(given.lag_s / _NS)
+        self.tick_ns = round(1.0 / given.tick_hz / _NS)
+        self.needs_u1 = given.law == "ideal"
+        leader = (self.topics.leader_cmd_vel,) if self.needs_u1 else ()
+        self.subscribes: tuple[str, ...] = (self.topics.estimate, topics.STOP, *leader)
+
+    def begin(self, now_ns: int) -> ControllerState:
+        """State of a controller that has heard nothing: it keeps the robot still."""
+        return ControllerState(next_tick_ns=now_ns, next_diagnostics_ns=now_ns)
+
+    def due_ns(self, state: ControllerState) -> int:
+        """Time of the next tick: a command leaves at least that often."""
+        return state.next_tick_ns
+
+    def step(
+        self, state: ControllerState, event: Event, now_ns: int
+    ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
+        """Take in an estimate, a stop or a tick; each leads to a command."""
+        if event.topic:
+            state = replace(state, receipts=(*state.receipts, consumed(event, now_ns)))
+        fresh = False
+        if event.topic == topics.STOP:
+            state = replace(state, stopped=True)
+        elif event.topic == self.topics.estimate:
+            try:
+                estimate = from_message(decode_as(event.payload, msg.LeaderEstimate))
+            except (MalformedPayloadError, ValueError):
+                return replace(state, refused=counted(state.refused, "malformed")), ()
+            if not estimate.measured_ns <= estimate.capture_ns <= now_ns + CLOCK_TOLERANCE_NS:
+                return replace(state, refused=counted(state.refused, "bad_stamp")), ()
+            fresh = estimate.status is Status.TRACKING
+            kept = estimate if fresh else state.estimate
+            state = replace(state, status=estimate.status, heard=True, estimate=kept)
+        elif event.topic == self.topics.leader_cmd_vel:
+            return self._hear_leader(state, event.payload), ()
+        elif event.topic:
+            return state, ()
+        state, out = self._command(state, now_ns, fresh=fresh)
+        return self._speak(state, out, now_ns)
+
+    def _hear_leader(self, state: ControllerState, payload: bytes) -> ControllerState:
+        try:
+            told = read_drive(payload, stamped=self.topics.stamped)
+        except MalformedPayloadError:
+            return replace(state, refused=counted(state.refused, "malformed"))
+        return replace(state, leader_u1=told.u)
+
+    def _command(
+        self, state: ControllerState, now_ns: int, *, fresh: bool
+    ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
+        decision = self._decide(state, now_ns)
+        acting = SentCommand(now_ns + self.transport_ns, decision.sent.v, decision.sent.u)
+        receipts = state.receipts
+        state = replace(
+            state,
+            sent=self._recent((*state.sent, acting), state.estimate, now_ns),
+            receipts=(),
+            decided=counted(state.decided, decision.stop.value if decision.stop else "driving"),
+            next_tick_ns=now_ns + self.tick_ns,
+        )
+        return state, self._messages(state, decision, receipts, now_ns, fresh=fresh)
+
+    def _decide(self, state: ControllerState, now_ns: int) -> Decision:
+        estimate = state.estimate
+        wanted: Motion | None = None
+        age: float | None = None
+        if estimate is not None:
+            age = (now_ns - estimate.measured_ns) * _NS
+            u1 = state.leader_u1 if self.needs_u1 else estimate.u1
+            if age <= self.max_age and _can_be(estimate):
+                shape = predict_shape(estimate, state.sent, now_ns + self.ahead_ns, self.lag)
+                wanted = self.law(shape, estimate.v1, u1, self.gains, self.limits)
+            else:
+                wanted = Motion(math.nan, math.nan)
+        return decide(
+            wanted,
+            self.limits,
+            age=age,
+            max_age=self.max_age,
+            settled=state.status is not Status.INITIALISING,
+            lost=state.status is Status.LOST,
+            stopped=state.stopped,
+        )
+
+    def _recent(
+        self, sent: tuple[SentCommand, ...], estimate: Estimate | None, now_ns: int
+    ) -> tuple[SentCommand, ...]:
+        """Commands that a prediction may still need: the one that acts at its begin, and later ones.
+
+        None begins before the capture of the estimate, or more than the largest age ago.
+        """
+        if estimate is None:
+            return sent[-1:]
+        begin_ns = max(estimate.capture_ns, now_ns - round(self.max_age / _NS))
+        first = 0
+        while first + 1 < len(sent) and sent[first + 1].from_ns <= begin_ns:
+            first += 1
+        return sent[first:]
+
+    def _messages(
+        self,
+        state: ControllerState,
+        decision: Decision,
+        receipts: tuple[msg.Consumed, ...],
+        now_ns: int,
+        *,
+        fresh: bool,
+    ) -> tuple[Outgoing, ...]:
+        estimate, wanted = state.estimate, decision.wanted
+        drive = drive_message(decision.sent, now_ns, self.topics.follower, stamped=self.topics.stamped)
+        record = msg.Command(
+            header=header(now_ns, self.topics.follower),
+            capture=to_time(estimate.capture_ns if estimate else 0),
+            measured=to_time(estimate.measured_ns if estimate else 0),
+            v2=decision.sent.v,
+            u2=decision.sent.u,
+            v2_wanted=wanted.v if wanted else math.nan,
+            u2_wanted=wanted.u if wanted else math.nan,
+            saturated=decision.saturated,
+            stop=decision.stop.value if decision.stop else "",
+            fresh=fresh,
+            consumed=receipts,
+        )
+        return (
+            outgoing(self.topics.cmd_vel, drive, now_ns),
+            outgoing(self.topics.command, record, now_ns),
+        )
+
+    def _speak(
+        self, state: ControllerState, out: tuple[Outgoing, ...], now_ns: int
+    ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
+        if now_ns < state.next_diagnostics_ns:
+            return state, out
+        state = replace(state, next_diagnostics_ns=now_ns + _DIAGNOSTICS_NS)
+        return state, (*out, self.report(state, now_ns))
+
+    def report(self, state: ControllerState, now_ns: int) -> Outgoing:
+        """Diagnostics: what was decided how often, and what was refused."""
+        problem = "" if state.heard else "waiting for estimates"
+        values: dict[str, object] = {"estimate": state.status.name.lower()}
+        values |= named_counts("decided", state.decided) | named_counts("refused", state.refused)
+        return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
+
+
+def _can_be(estimate: Estimate) -> bool:
+    """Whether every number that the law and the prediction rest on is one that a sound estimator gives."""
+    numbers = (
+        estimate.rho,
+        estimate.alpha2,
+        estimate.v1,
+        estimate.alpha1,
+        estimate.u1,
+        estimate.v2,
+        estimate.u2,
+    )
+    # NaN is not below the largest, and infinity neither.
+    return estimate.rho > 0.0 and all(abs(number) < _LARGEST for number in numbers)

@@ -1,0 +1,209 @@
+"""The estimator daemon: mocap frames or sightings and odometry in, estimates of the leader out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from msgspec import Struct, field
+from msgspec.structs import replace
+
+from estimation.belief import Model
+from estimation.estimate import Estimate, estimate_of
+from estimation.estimators import make_estimator, settling
+from estimation.inputs import History, InputTrust, follower_motion, remember
+from estimation.measurement import (
+    FrontEnd,
+    Measurement,
+    PoseNoise,
+    measure_body,
+    measure_body_from_mocap,
+    measure_world,
+)
+from estimation.motion import LeaderLimits, ProcessNoise
+from estimation.tracking import Status, Track, Tracker, TrackSettings, Verdict
+from hil.nodes.node import (
+    Counts,
+    Event,
+    Outgoing,
+    consumed,
+    counted,
+    diagnostics,
+    named_counts,
+    no_counts,
+    outgoing,
+)
+from hil.scenario.schema import Scenario
+from hil.wire import topics
+from hil.wire.estimate_message import AssumedErrors, to_message
+from hil.wire.intake import RefusedError, read_frame, read_odometry, read_sighting
+from hil.wire.message_types import Consumed
+from hil.wire.topics import topics_of
+
+NAME = "estimator"
+_TICK_NS = 50_000_000
+_DIAGNOSTICS_NS = 500_000_000
+_SAME_PLACE = 1e-3  # two robots whose centres are this close [m] are one body under two names
+_HISTORY = 2.0  # seconds of own motion kept, enough for the latest frame that the ring can take
+
+REASONS = {
+    Status.INITIALISING: "speed and bearing of the leader not yet known well enough",
+    Status.TRACKING: "",
+    Status.COASTING: "no measurement of late",
+    Status.REJECTING: "newest measurement outside the gate",
+    Status.LOST: "no usable measurement for too long",
+}
+
+
+class EstimatorState(Struct, frozen=True):
+    """All that the estimator remembers.
+
+    ``receipts``: inputs since the last estimate. ``refused``: inputs that were not used, by cause.
+    ``taken``: inputs that were used, by kind. ``last_status``: of the last estimate that went out.
+    """
+
+    track: Track = ()
+    history: History = ()
+    receipts: tuple[Consumed, ...] = ()
+    refused: Counts = field(default_factory=no_counts)
+    taken: Counts = field(default_factory=no_counts)
+    next_tick_ns: int = 0
+    next_diagnostics_ns: int = 0
+    last_out_ns: int = 0
+
+
+class EstimatorNode:
+    """Pure step of the estimator daemon."""
+
+    name = NAME
+
+    def __init__(self, scenario: Scenario) -> None:
+        given, leader = scenario.estimator, scenario.leader
+        self.scenario = scenario
+        self.topics = topics_of(scenario)
+        self.front_end = FrontEnd(given.front_end)
+        limits = LeaderLimits(leader.v_eps, leader.k_v, leader.k_u)
+        model = Model(self.front_end, limits, ProcessNoise.by_rule(limits, given.turn_bandwidth))
+        settled, unsettled = settling(given.kind)
+        settings = TrackSettings(
+            gate_probability=given.gate_probability,
+            reacquire_frames=given.reacquire_frames,
+            coast_after=given.coast_after_s,
+            lost_after=given.lost_after_s,
+            window=given.window_s,
+            settled_heading=settled,
+            unsettled_heading=unsettled,
+        )
+        self.tracker = Tracker(make_estimator(given.kind, model, given.difference_cutoff_s), settings)
+        self.trust = InputTrust(given.sigma_v2, given.sigma_u2, given.input_delay_s, given.input_lag_s)
+        self.pose_noise = PoseNoise(given.sigma_position, given.sigma_heading)
+        self.assumed = AssumedErrors.of(scenario)
+        self._handlers: dict[str, Callable[[EstimatorState, bytes, int], EstimatorState]] = {
+            topics.RIGID_BODIES: self._on_frame,
+            self.topics.odom: self._on_odometry,
+            self.topics.sighting: self._on_sighting,
+        }
+        self.subscribes = tuple(self._handlers)
+
+    def begin(self, now_ns: int) -> EstimatorState:
+        """State of an estimator that has seen nothing."""
+        return EstimatorState(next_tick_ns=now_ns, next_diagnostics_ns=now_ns)
+
+    def due_ns(self, state: EstimatorState) -> int:
+        """Time of the next tick."""
+        return state.next_tick_ns
+
+    def step(
+        self, state: EstimatorState, event: Event, now_ns: int
+    ) -> tuple[EstimatorState, tuple[Outgoing, ...]]:
+        """Take in a frame, a sighting, odometry, or a tick; every new measurement gives an estimate."""
+        if not event.topic:
+            return self._tick(state, now_ns)
+        handler = self._handlers.get(event.topic)
+        if handler is None:
+            return state, ()
+        state = replace(state, receipts=(*state.receipts, consumed(event, now_ns)))
+        before = state.track
+        try:
+            state = handler(state, event.payload, now_ns)
+        except RefusedError as refusal:
+            return replace(state, refused=counted(state.refused, refusal.cause)), ()
+        if state.track is before:
+            return state, ()
+        return self._publish(state, now_ns)
+
+    def estimate(self, state: EstimatorState, now_ns: int) -> Estimate | None:
+        """Newest estimate, its status as seen at ``now_ns``."""
+        if not state.track:
+            return None
+        newest = state.track[-1]
+        status = self.tracker.status(state.track, now_ns)
+        return estimate_of(newest.belief, newest.measurement, status, newest.nis, newest.used_ns)
+
+    def _on_frame(self, state: EstimatorState, payload: bytes, now_ns: int) -> EstimatorState:
+        frame = read_frame(payload, self.topics.leader, self.topics.follower, now_ns)
+        state = replace(state, taken=counted(state.taken, "frames"))
+        if frame.strangers:
+            state = replace(state, refused=counted(state.refused, "unknown_body"))
+        leader, follower = frame.leader, frame.follower
+        if math.dist(leader, (follower.x, follower.y)) < _SAME_PLACE:
+            raise RefusedError("same_place")
+        motion = follower_motion(state.history, frame.capture_ns, self.trust)
+        measure = measure_world if self.front_end is FrontEnd.WORLD else measure_body_from_mocap
+        return self._add(state, measure(frame.capture_ns, leader, follower, self.pose_noise, motion))
+
+    def _on_sighting(self, state: EstimatorState, payload: bytes, now_ns: int) -> EstimatorState:
+        if self.front_end is FrontEnd.WORLD:
+            raise RefusedError("sighting_without_body_front_end")
+        sighting = read_sighting(payload, now_ns)
+        state = replace(state, taken=counted(state.taken, "frames"))
+        motion = follower_motion(state.history, sighting.capture_ns, self.trust)
+        given = self.scenario.estimator
+        measurement = measure_body(
+            sighting.capture_ns, sighting.rho, sighting.alpha2, given.sigma_range, given.sigma_bearing, motion
+        )
+        return self._add(state, measurement)
+
+    def _on_odometry(self, state: EstimatorState, payload: bytes, now_ns: int) -> EstimatorState:
+        sample = read_odometry(payload, now_ns)
+        history = remember(state.history, sample, _HISTORY)
+        return replace(state, history=history, taken=counted(state.taken, "odometry"))
+
+    def _add(self, state: EstimatorState, measurement: Measurement) -> EstimatorState:
+        late = bool(state.track) and measurement.capture_ns < state.track[-1].measurement.capture_ns
+        track, verdict = self.tracker.add(state.track, measurement)
+        if verdict in (Verdict.DUPLICATE, Verdict.LATE, Verdict.GATED):
+            state = replace(state, refused=counted(state.refused, verdict.value))
+        else:
+            state = replace(state, taken=counted(state.taken, "used"))
+        if late and verdict is not Verdict.DUPLICATE:
+            state = replace(state, taken=counted(state.taken, "late"))
+        return replace(state, track=track)
+
+    def _publish(self, state: EstimatorState, now_ns: int) -> tuple[EstimatorState, tuple[Outgoing, ...]]:
+        estimate = self.estimate(state, now_ns)
+        if estimate is None:
+            return state, ()
+        reason = REASONS[estimate.status]
+        message = to_message(estimate, now_ns, self.topics.follower, reason, self.assumed, state.receipts)
+        out = outgoing(self.topics.estimate, message, estimate.capture_ns)
+        return replace(state, receipts=(), last_out_ns=now_ns), (out,)
+
+    def _tick(self, state: EstimatorState, now_ns: int) -> tuple[EstimatorState, tuple[Outgoing, ...]]:
+        """Speak up while measurements are missing, and report on the node itself."""
+        out: tuple[Outgoing, ...] = ()
+        status = self.tracker.status(state.track, now_ns)
+        if status in (Status.COASTING, Status.LOST) and (now_ns - state.last_out_ns) * 2 > _TICK_NS:
+            state, out = self._publish(state, now_ns)
+        if now_ns >= state.next_diagnostics_ns:
+            out = (*out, self.report(state, now_ns))
+            state = replace(state, next_diagnostics_ns=now_ns + _DIAGNOSTICS_NS)
+        return replace(state, next_tick_ns=now_ns + _TICK_NS), out
+
+    def report(self, state: EstimatorState, now_ns: int) -> Outgoing:
+        """Diagnostics: status of the track, inputs taken and refused."""
+        problem = "" if state.track and state.history else "waiting for mocap and odometry"
+        status = self.tracker.status(state.track, now_ns)
+        values: dict[str, object] = {"status": status.name.lower()}
+        values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)
+        return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)

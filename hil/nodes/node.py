@@ -1,0 +1,102 @@
+"""The one shape of every daemon: a pure step over events, and what it owes to the log.
+
+A node never looks at a clock and never touches a socket. Live daemons, lockstep and replay differ only in who
+calls :meth:`Node.step` and what ``now_ns`` is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+from hil.wire.message_types import Consumed, DiagnosticArray, DiagnosticStatus, KeyValue, Message
+from hil.wire.messages import encode, header, to_time, typename_of
+
+S = TypeVar("S")
+
+Counts = Mapping[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """What happens to a node: a payload on a topic or, with an empty ``topic``, the passing of time."""
+
+    topic: str = ""
+    payload: bytes = b""
+
+
+TICK = Event()
+
+
+@dataclass(frozen=True, slots=True)
+class Outgoing:
+    """A message that a node wants published; ``stamp_ns`` is the time that it speaks of."""
+
+    topic: str
+    typename: str
+    payload: bytes
+    stamp_ns: int
+
+
+class Node(Protocol[S]):
+    """A daemon without its surroundings."""
+
+    name: str
+    subscribes: tuple[str, ...]
+
+    def begin(self, now_ns: int) -> S:
+        """State at the moment the node comes up."""
+
+    def due_ns(self, state: S) -> int:
+        """When the node wants its next tick if nothing else happens before."""
+
+    def report(self, state: S, now_ns: int) -> Outgoing:
+        """Diagnostics of the node: how it is and what it has counted; also its last word."""
+
+    def step(self, state: S, event: Event, now_ns: int) -> tuple[S, tuple[Outgoing, ...]]:
+        """State after an event, and what to publish. Never raises for anything that came from the wire."""
+
+
+def outgoing(topic: str, message: Message, stamp_ns: int) -> Outgoing:
+    """Encode a message for publication."""
+    return Outgoing(topic, typename_of(message), encode(message), stamp_ns)
+
+
+def digest(topic: str, payload: bytes) -> int:
+    """Identify a payload on a topic by 64 bits of BLAKE2b, so that a log can say what a step consumed."""
+    name = topic.encode()
+    return int.from_bytes(hashlib.blake2b(name + b"\0" + payload, digest_size=8).digest(), "little")
+
+
+def consumed(event: Event, now_ns: int) -> Consumed:
+    """Receipt for an event that a node took in at ``now_ns``."""
+    return Consumed(digest(event.topic, event.payload), to_time(now_ns))
+
+
+def no_counts() -> Counts:
+    """Counts of nothing."""
+    return {}
+
+
+def counted(counts: Counts, cause: str) -> Counts:
+    """Counts with one more of a cause."""
+    return {**counts, cause: counts.get(cause, 0) + 1}
+
+
+def named_counts(group: str, counts: Counts) -> dict[str, object]:
+    """Counts as values of a diagnostics message, each key ``group.cause``."""
+    return {f"{group}.{cause}": count for cause, count in counts.items()}
+
+
+def diagnostics(name: str, now_ns: int, problem: str, values: Mapping[str, object]) -> DiagnosticArray:
+    """One node's state as ROS diagnostics: OK without a problem, else WARN with the problem as message."""
+    status = DiagnosticStatus(
+        level=1 if problem else 0,
+        name=f"abreast/{name}",
+        message=problem or "ok",
+        hardware_id="",
+        values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+    )
+    return DiagnosticArray(header=header(now_ns, ""), status=[status])

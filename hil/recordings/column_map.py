@@ -1,0 +1,157 @@
+"""Column maps: what the columns of a CSV recording mean.
+
+A map is a TOML file. ``[columns]`` says where the measurement comes from: ``t``, then either ``rho`` and
+``alpha2`` or both poses, and the follower's motion ``v2``, ``u2``. ``[truth]`` says what is known of the true
+states. ``[scenario]`` has a ``base`` (name or path) and what differs from it: front end, noise, limits.
+An entry is a column's name, or ``{ column, scale, offset }``, or ``{ constant }``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+from msgspec import Struct
+
+from hil.errors import UsageError
+from hil.replay.topic_map import MAPS
+from hil.scenario.checked_toml import checked, locate, read_toml
+from hil.scenario.files import merged_scenario
+from hil.scenario.schema import Scenario
+
+
+class Source(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Where a quantity comes from: ``column`` times ``scale`` plus ``offset``, or a ``constant``."""
+
+    column: str | None = None
+    constant: float | None = None
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+Entry = str | Source
+
+
+class Columns(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What the estimator gets. Time [s], distances [m], angles [rad], speed [m/s], turn rate [rad/s]."""
+
+    t: Entry
+    v2: Entry
+    u2: Entry
+    rho: Entry | None = None
+    alpha2: Entry | None = None
+    leader_x: Entry | None = None
+    leader_y: Entry | None = None
+    leader_theta: Entry | None = None
+    follower_x: Entry | None = None
+    follower_y: Entry | None = None
+    follower_theta: Entry | None = None
+
+
+class TruthColumns(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What is known of the true states; the rest stays unknown."""
+
+    leader_x: Entry | None = None
+    leader_y: Entry | None = None
+    leader_theta: Entry | None = None
+    v1: Entry | None = None
+    u1: Entry | None = None
+    follower_x: Entry | None = None
+    follower_y: Entry | None = None
+    follower_theta: Entry | None = None
+    v2: Entry | None = None
+    u2: Entry | None = None
+
+
+class _File(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    columns: Columns
+    truth: TruthColumns = TruthColumns()
+    inputs: Literal["measured", "commanded"] = "measured"
+    delimiter: str = ","
+    scenario: dict[str, Any] = {}
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnMap:
+    """A column map with the scenario that it leads to.
+
+    ``columns``, ``truth``: sources by quantity, only those that are given. ``commanded``: v2 and u2 of a row
+    are commands that were sent after its measurement, so that the measurement cannot rest on them.
+    """
+
+    path: Path
+    columns: dict[str, Source]
+    truth: dict[str, Source]
+    commanded: bool
+    delimiter: str
+    scenario: Scenario
+
+    @property
+    def sighted(self) -> bool:
+        """Whether the leader is measured by range and bearing, not by poses of both."""
+        return "rho" in self.columns
+
+
+def load_column_map(name_or_path: str) -> ColumnMap:
+    """Read a column map by its shipped name or from a TOML file.
+
+    Raises :class:`UsageError` for a file that isn't there or not TOML, an unknown key (naming the nearest
+    known one), a wrong value, or columns that don't make up a measurement.
+    """
+    path = locate("map", MAPS, name_or_path)
+    source = f"map {path.stem}"
+    tree = read_toml(path, "map")
+    if "topics" in tree:
+        raise UsageError(f"{source}: maps the topics of a log; take it to: abreast replay LOG --map {path}")
+    file = checked(tree, _File, source)
+    if len(file.delimiter) != 1:
+        raise UsageError(
+            f"{source}: delimiter is {file.delimiter!r}, expected one character, such as ',' or ';'"
+        )
+    chart = ColumnMap(
+        path=path,
+        columns=dict(_given(file.columns, f"{source}: columns")),
+        truth=dict(_given(file.truth, f"{source}: truth")),
+        commanded=file.inputs == "commanded",
+        delimiter=file.delimiter,
+        scenario=merged_scenario(file.scenario, path.stem, f"{source}: scenario"),
+    )
+    _check_measurement(chart, source)
+    return chart
+
+
+def _given(section: Struct, where: str) -> Iterator[tuple[str, Source]]:
+    for name, entry in msgspec.structs.asdict(section).items():
+        if entry is None:
+            continue
+        source = Source(column=entry) if isinstance(entry, str) else entry
+        if (source.column is None) == (source.constant is None):
+            raise UsageError(f"{where}.{name}: give either a column or a constant")
+        yield name, source
+
+
+def _check_measurement(chart: ColumnMap, source: str) -> None:
+    sighting = {"rho", "alpha2"}
+    poses = {"leader_x", "leader_y", "follower_x", "follower_y", "follower_theta"}
+    has_sighting, has_poses = sighting & set(chart.columns), poses & set(chart.columns)
+    if has_sighting and has_poses:
+        raise UsageError(
+            f"{source}: columns: give either rho and alpha2 or the poses; true poses go to [truth]"
+        )
+    wanted = sighting if has_sighting else poses
+    missing = sorted(wanted - set(chart.columns))
+    if missing and not has_sighting | has_poses:
+        raise UsageError(
+            f"{source}: columns: no measurement; give rho and alpha2, or {', '.join(sorted(poses))}"
+        )
+    if missing:
+        raise UsageError(
+            f"{source}: columns: {', '.join(missing)} missing; name a column or a constant for it"
+        )
+    if has_sighting and chart.scenario.estimator.front_end != "body":
+        raise UsageError(
+            f"{source}: range and bearing need the body front end; set scenario.estimator.front_end = 'body'"
+        )

@@ -1,0 +1,1 @@
+"""A log through the same steps again, our own or a foreign one."""

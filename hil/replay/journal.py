@@ -1,0 +1,182 @@
+"""Putting logged inputs through a node again, step by step, to see whether the same comes out.
+
+Every estimate and every command lists what its node had taken in since the one before, by digest, with the
+``now`` of each step. That, and the payloads themselves, is enough to repeat the node's life.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from hil.nodes.node import TICK, Event, Node, Outgoing, digest
+
+S = TypeVar("S")
+
+Timed = tuple[Event, int]
+"""An event and the ``now_ns`` at which a node takes it in."""
+
+Receipt = tuple[int, int]
+"""The digest of an input and the ``now_ns`` at which it was taken in."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """An output as it was logged.
+
+    ``computed_ns``: when it was made, None if its payload cannot be read. ``consumed``: the inputs since the
+    output before, in order.
+    """
+
+    payload: bytes
+    computed_ns: int | None
+    consumed: tuple[Receipt, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Repeated:
+    """What a node put out where an output had been recorded, and how many of its inputs are missing."""
+
+    recorded: Recorded
+    outputs: tuple[Outgoing, ...]
+    missing: int
+
+
+@dataclass(frozen=True, slots=True)
+class Parity:
+    """How many outputs were compared, how many differ in any bit, and the place of the first that does.
+
+    ``unrecorded``: messages that went out beside them and are not in the log: nobody can compare them.
+    """
+
+    compared: int
+    mismatched: int
+    first: int | None = None
+    unrecorded: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Journey(Generic[S]):
+    """A node's life: the state it ended in, and all its outputs. ``repeated`` is empty for a plain feed."""
+
+    state: S
+    outputs: tuple[Outgoing, ...]
+    repeated: tuple[Repeated, ...] = ()
+
+    @property
+    def missing(self) -> int:
+        """How many consumed inputs the log does not have."""
+        return sum(step.missing for step in self.repeated)
+
+
+def index_by_digest(events: Iterable[Timed]) -> dict[int, Event]:
+    """Events by what receipts call them."""
+    return {digest(event.topic, event.payload): event for event, _ in events}
+
+
+def refeed(node: Node[S], topic: str, recorded: Sequence[Recorded], index: Mapping[int, Event]) -> Journey[S]:
+    """Repeat a node's life from the outputs that it left on a topic.
+
+    An output that none of its inputs brings forth came from a tick at the time it was computed. Inputs that
+    are missing in the index are passed over and counted; what was consumed after the last output, nobody can
+    know.
+    """
+    state = node.begin(_first_ns(recorded))
+    repeated: list[Repeated] = []
+    for output in recorded:
+        out: list[Outgoing] = []
+        missing = 0
+        for name, now_ns in output.consumed:
+            event = index.get(name)
+            if event is None:
+                missing += 1
+                continue
+            state, sent = node.step(state, event, now_ns)
+            out.extend(sent)
+        if output.computed_ns is not None and not any(message.topic == topic for message in out):
+            state, sent = node.step(state, TICK, output.computed_ns)
+            out.extend(sent)
+        repeated.append(Repeated(output, tuple(out), missing))
+    outputs = tuple(message for step in repeated for message in step.outputs)
+    return Journey(state, outputs, tuple(repeated))
+
+
+def feed(node: Node[S], events: Iterable[Timed]) -> Journey[S]:
+    """Let a node live through events in their order, with its own ticks where they fall due in between."""
+    outputs: list[Outgoing] = []
+    state: S | None = None
+    for event, now_ns in events:
+        if state is None:
+            state = node.begin(now_ns)
+        while (due_ns := node.due_ns(state)) < now_ns:
+            state, sent = node.step(state, TICK, due_ns)
+            outputs.extend(sent)
+        state, sent = node.step(state, event, now_ns)
+        outputs.extend(sent)
+    return Journey(node.begin(0) if state is None else state, tuple(outputs))
+
+
+def parity_of(repeated: Sequence[Repeated], topic: str, beside: Mapping[str, Sequence[int]]) -> Parity:
+    """Compare repeated outputs with the recorded ones, bit for bit.
+
+    An output agrees if the node put out just that one payload on the topic. ``beside``: what was logged, by
+    digest and in order, on topics that the node sends to as well; an output also differs if the log has
+    something else in the place of what went there. What the recorder missed there is only counted.
+    """
+    wrong = {
+        place for place, step in enumerate(repeated) if _payloads(step, topic) != [step.recorded.payload]
+    }
+    unrecorded = 0
+    for name, logged in beside.items():
+        sent = [
+            (digest(name, payload), place)
+            for place, step in enumerate(repeated)
+            for payload in _payloads(step, name)
+        ]
+        differing, missed = _compare_in_order(sent, logged)
+        wrong |= differing
+        unrecorded += missed
+    return Parity(len(repeated), len(wrong), min(wrong, default=None), unrecorded)
+
+
+def _compare_in_order(sent: Sequence[tuple[int, int]], logged: Sequence[int]) -> tuple[set[int], int]:
+    """Places of what was sent and is logged as something else, and how much is not logged at all.
+
+    Both are walked in step. What one has and the other does not is passed over: the recorder can miss a
+    message, and others can send on the topic. Only where both happen at once, one was put for the other.
+    """
+    to_send, to_come = Counter(name for name, _ in sent), Counter(logged)
+    differing: set[int] = set()
+    missed = 0
+    at = 0
+    for name, place in sent:
+        lost = to_come[name] == 0
+        while at < len(logged) and logged[at] != name and to_send[logged[at]] == 0:
+            to_come[logged[at]] -= 1
+            at += 1
+            if lost:
+                differing.add(place)
+                break
+        to_send[name] -= 1
+        if at < len(logged) and logged[at] == name:
+            to_come[name] -= 1
+            at += 1
+        elif place not in differing:
+            missed += 1
+    return differing, missed
+
+
+def _payloads(step: Repeated, topic: str) -> list[bytes]:
+    return [message.payload for message in step.outputs if message.topic == topic]
+
+
+def _first_ns(recorded: Sequence[Recorded]) -> int:
+    """When the node first did anything that is known of."""
+    for output in recorded:
+        if output.consumed:
+            return output.consumed[0][1]
+        if output.computed_ns is not None:
+            return output.computed_ns
+    return 0

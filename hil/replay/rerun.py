@@ -1,0 +1,120 @@
+"""Replay: a log through the very same steps that run live, to verify it or to estimate anew."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from hil.errors import UsageError
+from hil.log.events import check_inputs, logged_events, recorded_commands, recorded_estimates
+from hil.log.metadata import scenario_of
+from hil.log.reader import Log
+from hil.nodes.controller import ControllerNode, ControllerState
+from hil.nodes.estimator import EstimatorNode, EstimatorState
+from hil.nodes.node import Outgoing, digest
+from hil.replay.foreign_log import foreign_events
+from hil.replay.journal import Journey, Parity, feed, index_by_digest, parity_of, refeed
+from hil.replay.topic_map import TopicMap
+from hil.scenario.schema import Scenario
+from hil.wire import message_types as msg
+from hil.wire.messages import decode_as, typename_of
+
+M = TypeVar("M", bound=msg.Message)
+
+
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """What came out of a replay.
+
+    ``parity``: by ``estimates`` and ``commands``, how they compare with the recorded ones; empty where the
+    log was estimated anew. ``missing_inputs``: inputs that were consumed live but are not in the log.
+    ``controller``: None where there were no commands to repeat.
+    """
+
+    scenario: Scenario
+    estimates: tuple[msg.LeaderEstimate, ...]
+    commands: tuple[msg.Command, ...]
+    estimator: EstimatorState
+    controller: ControllerState | None = None
+    parity: Mapping[str, Parity] = field(default_factory=dict)
+    missing_inputs: int = 0
+
+    @property
+    def mismatched(self) -> int:
+        """How many outputs differ from the recorded ones."""
+        return sum(parity.mismatched for parity in self.parity.values())
+
+
+def replay(log: Log, scenario: Scenario | None = None) -> Replay:
+    """Put one of our logs through the estimator of a scenario (the log's own by default).
+
+    A log with estimates is replayed by what each of these consumed: with its own scenario its estimates and
+    commands come out again, bit for bit; with another one its estimates are made anew, and there are no
+    commands, as these would have moved the robot elsewhere. A log without estimates is fed in log order.
+    Raises :class:`UsageError` for a log that is not ours or lacks what the estimator needs.
+    """
+    own = scenario_of(log)
+    if own is None:
+        raise UsageError(
+            f"log {log.path}: was not made by abreast; name its topics with --map FILE "
+            f"(topics there: {', '.join(sorted(log.topics)) or 'none'})"
+        )
+    chosen = own if scenario is None else scenario
+    if chosen != own:
+        check_inputs(log, chosen)
+    node = EstimatorNode(chosen)
+    recorded = recorded_estimates(log, node.topics.estimate)
+    if not recorded:
+        check_inputs(log, chosen)
+        return _estimated_anew(chosen, feed(node, logged_events(log, node.subscribes)))
+    index = index_by_digest(logged_events(log, node.subscribes))
+    journey = refeed(node, node.topics.estimate, recorded, index)
+    if chosen != own:
+        return _estimated_anew(chosen, journey)
+    estimates = parity_of(journey.repeated, node.topics.estimate, {})
+    return _with_commands(log, own, journey, estimates)
+
+
+def replay_foreign(log: Log, chart: TopicMap) -> Replay:
+    """Put another lab's log through the estimator of the scenario that its topic map leads to.
+
+    Raises :class:`UsageError` as :func:`hil.replay.foreign_log.foreign_events`.
+    """
+    node = EstimatorNode(chart.scenario)
+    return _estimated_anew(chart.scenario, feed(node, foreign_events(log, chart)))
+
+
+def _estimated_anew(scenario: Scenario, journey: Journey[EstimatorState]) -> Replay:
+    estimates = _decoded(journey.outputs, msg.LeaderEstimate)
+    return Replay(scenario, estimates, (), journey.state, missing_inputs=journey.missing)
+
+
+def _with_commands(
+    log: Log, scenario: Scenario, estimator: Journey[EstimatorState], estimates: Parity
+) -> Replay:
+    """Repeat the controller's life too. It is fed with the estimates as logged, so it is judged by itself."""
+    node = ControllerNode(scenario)
+    recorded = recorded_commands(log, node.topics.command)
+    index = index_by_digest(logged_events(log, node.subscribes))
+    journey = refeed(node, node.topics.command, recorded, index)
+    drive = node.topics.cmd_vel
+    sent = [digest(event.topic, event.payload) for event, _ in logged_events(log, [drive])]
+    return Replay(
+        scenario=scenario,
+        estimates=_decoded(estimator.outputs, msg.LeaderEstimate),
+        commands=_decoded(journey.outputs, msg.Command),
+        estimator=estimator.state,
+        controller=journey.state,
+        parity={
+            "estimates": estimates,
+            "commands": parity_of(journey.repeated, node.topics.command, {drive: sent}),
+        },
+        missing_inputs=estimator.missing + journey.missing,
+    )
+
+
+def _decoded(outputs: Iterable[Outgoing], kind: type[M]) -> tuple[M, ...]:
+    return tuple(
+        decode_as(message.payload, kind) for message in outputs if message.typename == typename_of(kind)
+    )

@@ -1,0 +1,93 @@
+"""What a replay is judged by, and whether it passes the checks that were asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from hil.errors import UsageError
+from hil.judge.evidence import IMPORT, Evidence, evidence_of_log
+from hil.log.metadata import mode_of
+from hil.log.reader import Log
+from hil.replay.journal import Parity
+from hil.replay.rerun import Replay
+from hil.wire.message_types import LeaderEstimate
+from hil.wire.messages import to_ns
+
+
+def evidence_of_replay(
+    log: Log, played: Replay, from_s: float | None = None, to_s: float | None = None
+) -> Evidence:
+    """Evidence of a log with the estimates, commands and counts of its replay in place of the recorded ones.
+
+    ``from_s``, ``to_s`` [s] limit the evaluation: in an imported log in the source's own time, else from when
+    an emulated leader set off, else from the first capture. Raises :class:`UsageError` if they leave no
+    estimate.
+    """
+    found = evidence_of_log(log, played.scenario)
+    captures = [to_ns(estimate.header.stamp) for estimate in played.estimates]
+    zero_ns = found.zero_ns
+    if found.motion_since_ns is None and mode_of(log) != IMPORT:
+        zero_ns = min(captures, default=zero_ns)
+    evidence = replace(
+        found,
+        mode="replay",
+        estimates=played.estimates,
+        commands=played.commands,
+        taken=played.estimator.taken,
+        refused=played.estimator.refused,
+        zero_ns=zero_ns,
+        evaluate_from_ns=None if from_s is None else zero_ns + round(from_s * 1e9),
+        evaluate_to_ns=None if to_s is None else zero_ns + round(to_s * 1e9),
+    )
+    if captures and not evaluated(evidence):
+        first_s, last_s = ((at - zero_ns) * 1e-9 for at in (min(captures), max(captures)))
+        raise UsageError(
+            f"log {log.path}: no estimate between --from and --to; there are some from {first_s:.3f} s "
+            f"to {last_s:.3f} s"
+        )
+    return evidence
+
+
+def evaluated(evidence: Evidence) -> list[LeaderEstimate]:
+    """Estimates within the limits that were asked for, both ends included; all if there are none."""
+    first, last = evidence.evaluate_from_ns, evidence.evaluate_to_ns
+    return [
+        estimate
+        for estimate in evidence.estimates
+        if (first is None or to_ns(estimate.header.stamp) >= first)
+        and (last is None or to_ns(estimate.header.stamp) <= last)
+    ]
+
+
+def parity_json(played: Replay) -> dict[str, Any]:
+    """Counts of the comparison as the summary has them."""
+    nothing = Parity(0, 0)
+    counts = {name: played.parity.get(name, nothing) for name in ("estimates", "commands")}
+    return {
+        name: {"compared": parity.compared, "mismatched": parity.mismatched}
+        for name, parity in counts.items()
+    }
+
+
+def why_not_same(log: Log, played: Replay) -> str:
+    """What speaks against a replay that repeats the log bit for bit; empty if nothing does."""
+    compared = sum(parity.compared for parity in played.parity.values())
+    if not compared:
+        return f"log {log.path}: holds no estimates, so there is nothing to verify"
+    wrong = [
+        f"{parity.mismatched} of {parity.compared} {name} differ (the first is number {parity.first + 1})"
+        for name, parity in played.parity.items()
+        if parity.first is not None
+    ]
+    if not wrong:
+        return ""
+    lost = f"; {played.missing_inputs} inputs are missing in the log" if played.missing_inputs else ""
+    return f"log {log.path}: {', '.join(wrong)}{lost}"
+
+
+def violated_bounds(summary: Mapping[str, Any]) -> dict[str, int]:
+    """Extended bounds that samples of the evaluation lie outside of, with the number of samples."""
+    violations = summary.get("bounds", {}).get("violations", {})
+    return {name: count for name, count in violations.items() if name.endswith("_extended") and count}

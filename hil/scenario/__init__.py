@@ -1,0 +1,1 @@
+"""Scenarios: what an experiment is, read from TOML and checked."""

@@ -1,0 +1,97 @@
+"""Reading scenarios: by name or path, with overrides, each mistake answered by one line that helps."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import msgspec
+import tomli_w
+
+from hil.errors import UsageError
+from hil.scenario.checked_toml import checked, locate, read_toml, shipped_names
+from hil.scenario.schema import Scenario
+
+_FOLDER = "scenarios"
+_DEFAULT_BASE = "turtlebot3"
+
+
+def scenario_names() -> list[str]:
+    """Names of the scenarios that abreast ships, sorted."""
+    return shipped_names(_FOLDER)
+
+
+def load_scenario(name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
+    """Read a scenario by its shipped name or from a TOML file, then apply ``section.key=value`` overrides.
+
+    Raises :class:`UsageError` for an unknown name, unreadable TOML, an unknown key (naming the nearest known
+    one), a wrong type, or a value out of range.
+    """
+    path = locate("scenario", _FOLDER, name_or_path)
+    tree = read_toml(path, "scenario")
+    tree.setdefault("name", path.stem)
+    return build_scenario(tree, overrides, source=f"scenario {path.stem}")
+
+
+def build_scenario(
+    tree: Mapping[str, Any], overrides: Iterable[str] = (), source: str = "scenario"
+) -> Scenario:
+    """Check a tree of plain values (as TOML gives) and turn it into a :class:`Scenario`."""
+    merged = msgspec.to_builtins(tree)
+    for override in overrides:
+        _apply(merged, override)
+    return checked(merged, Scenario, source)
+
+
+def merged_scenario(part: Mapping[str, Any], name: str, source: str) -> Scenario:
+    """Scenario from its ``base`` (a scenario's name or path) with the other keys of ``part`` put over it.
+
+    The result is called ``name`` unless the part names itself. Raises :class:`UsageError` as
+    :func:`load_scenario` does, beginning with ``source``.
+    """
+    given = dict(part)
+    base = given.pop("base", _DEFAULT_BASE)
+    if not isinstance(base, str):
+        raise UsageError(f"{source}: base is {base!r}, expected the name of a scenario or a path to one")
+    tree = msgspec.to_builtins(load_scenario(base))
+    return build_scenario(_overlaid(tree, {"name": name, "description": "", **given}), source=source)
+
+
+def scenario_text(scenario: Scenario) -> str:
+    """Render the scenario, defaults included, as TOML that :func:`load_scenario` reads back unchanged."""
+    return tomli_w.dumps(msgspec.to_builtins(scenario))
+
+
+def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
+    """Return the scenario with ``section.key=value`` overrides applied and checked."""
+    return build_scenario(msgspec.to_builtins(scenario), overrides, source=f"scenario {scenario.name}")
+
+
+def _overlaid(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Tree with the upper one's values where it has any; a section with a ``kind`` replaces the lower's."""
+    result = dict(below)
+    for key, value in above.items():
+        under = result.get(key)
+        if isinstance(value, Mapping) and isinstance(under, Mapping) and "kind" not in value:
+            result[key] = _overlaid(under, value)
+        else:
+            result[key] = value
+    return result
+
+
+def _apply(tree: dict[str, Any], override: str) -> None:
+    key, equals, text = override.partition("=")
+    steps = [step.strip() for step in key.split(".")]
+    if not equals or not all(steps):
+        raise UsageError(f"--set {override!r}: expected section.key=value, for example mocap.loss=0.05")
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
+        value = text.strip()
+    node: Any = tree
+    for step in steps[:-1]:
+        node = node.setdefault(step, {})
+        if not isinstance(node, dict):
+            raise UsageError(f"--set {override!r}: {step!r} is a value and has no keys below it")
+    node[steps[-1]] = value

@@ -1,0 +1,78 @@
+"""From a scenario's plain values to the objects of ``formation`` and ``controllers`` that they stand for.
+
+A value that the schema lets through but that makes no sense (a table whose times run backwards, two robots in
+one place) is answered here, with a :class:`~hil.errors.UsageError` that names the scenario.
+"""
+
+from __future__ import annotations
+
+from controllers.laws import LAWS, Gains
+from controllers.limits import Limits
+from formation.angles import FloatArray
+from formation.closed_loop import FollowerLaw, Trajectory, simulate_pair
+from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
+from formation.pose import Motion, Pose
+from formation.shape import Shape, shape_of
+from formation.spacing import Spacing
+from hil.errors import UsageError
+from hil.scenario.schema import ConstantProgram, ImpulseProgram, Scenario, SinusoidProgram
+
+
+def leader_program(scenario: Scenario) -> LeaderProgram:
+    """Program that the leader drives."""
+    given = scenario.leader.program
+    try:
+        if isinstance(given, ConstantProgram):
+            return Constant(given.v, given.u)
+        if isinstance(given, SinusoidProgram):
+            return Sinusoid(given.v, given.u_mean, given.u_amplitude, given.omega)
+        if isinstance(given, ImpulseProgram):
+            return Impulse(given.v, given.u_amplitude, given.t_centre, given.t_width)
+        return Table(given.t, given.v, given.u)
+    except ValueError as error:
+        raise UsageError(f"scenario {scenario.name}: leader.program: {error}; correct the table") from None
+
+
+def gains(scenario: Scenario) -> Gains:
+    """Gains of the follower's law, its spacing functions included."""
+    given = scenario.controller
+    return Gains(given.mu1, given.mu2, Spacing(scenario.formation.rho_0, given.mu_rho))
+
+
+def limits(scenario: Scenario) -> Limits:
+    """Limits that the controller keeps to."""
+    return Limits(scenario.controller.v_max, scenario.controller.u_max)
+
+
+def start_poses(scenario: Scenario) -> tuple[Pose, Pose]:
+    """Start poses of leader and follower in the world frame."""
+    leader, follower = Pose(*scenario.leader.pose), Pose(*scenario.follower.pose)
+    if (leader.x, leader.y) == (follower.x, follower.y):
+        raise UsageError(
+            f"scenario {scenario.name}: leader.pose and follower.pose are both at ({leader.x}, {leader.y}); "
+            "set them apart"
+        )
+    return leader, follower
+
+
+def start_shape(scenario: Scenario) -> Shape:
+    """Shape of the pair at the start."""
+    return shape_of(*start_poses(scenario))
+
+
+def follower_law(scenario: Scenario) -> FollowerLaw:
+    """Law of the scenario with its gains and without limits, as the noise-free simulation takes it."""
+    law, with_gains = LAWS[scenario.controller.law], gains(scenario)
+
+    def follower(shape: Shape, v1: float, u1: float) -> Motion:
+        return law(shape, v1, u1, with_gains)
+
+    return follower
+
+
+def noise_free_run(scenario: Scenario, times: FloatArray) -> Trajectory:
+    """Trajectory of the pair without noise, delay and limits, at the given times [s] from its start.
+
+    Raises :class:`~formation.closed_loop.IntegrationError` if the motion breaks down.
+    """
+    return simulate_pair(*start_poses(scenario), leader_program(scenario), follower_law(scenario), times)

@@ -1,0 +1,183 @@
+"""A scenario: everything that defines an experiment, as read from a TOML file.
+
+SI units and radians throughout. Every key has a default except where a robot or a lab must decide;
+an unknown key, a wrong type or a value out of range is a :class:`~hil.errors.UsageError`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+Positive = Annotated[float, Meta(gt=0.0)]
+Rate = Annotated[float, Meta(ge=0.01, le=10_000.0)]
+NonNegative = Annotated[float, Meta(ge=0.0)]
+Probability = Annotated[float, Meta(ge=0.0, lt=1.0)]
+Name = Annotated[str, Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
+PoseTriple = tuple[float, float, float]
+
+LawName = Literal["independent", "ideal"]
+EstimatorName = Literal["ekf", "ukf", "difference"]
+FrontEnd = Literal["world", "body"]
+
+
+class _Section(Struct, frozen=True, forbid_unknown_fields=True):
+    """Base of all sections: immutable, and an unknown key is an error."""
+
+
+class RunSection(_Section, frozen=True, kw_only=True):
+    """How long a run lasts, its random seed, and from when on it is judged."""
+
+    duration_s: Positive = 30.0
+    seed: Annotated[int, Meta(ge=0, le=2**62)] = 1
+    evaluate_from_s: NonNegative = 15.0
+
+
+class FormationSection(_Section, frozen=True, kw_only=True):
+    """The desired distance rho_0 [m] between the robots."""
+
+    rho_0: Positive
+
+
+class ControllerSection(_Section, frozen=True, kw_only=True):
+    """The follower's law, its gains, and what the guard and the prediction assume.
+
+    ``max_age_s``: oldest measurement a command may rest on. ``lag_s``, ``transport_s``: actuator lag and
+    command transport time that the prediction looks ahead by. ``command_type``: what the robot takes.
+    """
+
+    law: LawName = "independent"
+    mu1: Positive
+    mu2: Positive
+    mu_rho: Positive
+    v_max: Positive = 0.22
+    u_max: Positive = 2.84
+    max_age_s: Positive = 0.2
+    lag_s: NonNegative = 0.1
+    transport_s: NonNegative = 0.0
+    tick_hz: Rate = 50.0
+    command_type: Literal["TwistStamped", "Twist"] = "TwistStamped"
+
+
+class ConstantProgram(_Section, frozen=True, kw_only=True, tag="constant", tag_field="kind"):
+    """Constant speed v and turn rate u."""
+
+    v: NonNegative
+    u: float = 0.0
+
+
+class SinusoidProgram(_Section, frozen=True, kw_only=True, tag="sinusoid", tag_field="kind"):
+    """Constant speed v, turn rate u_mean + u_amplitude * sin(omega * t)."""
+
+    v: NonNegative
+    u_mean: float = 0.0
+    u_amplitude: float
+    omega: Positive
+
+
+class ImpulseProgram(_Section, frozen=True, kw_only=True, tag="impulse", tag_field="kind"):
+    """Constant speed v, turn rate u_amplitude * exp(-(t - t_centre)^2 / (2 t_width^2))."""
+
+    v: NonNegative
+    u_amplitude: float
+    t_centre: float
+    t_width: Positive
+
+
+class TableProgram(_Section, frozen=True, kw_only=True, tag="table", tag_field="kind"):
+    """Speed v and turn rate u at the times t, linear in between and held at the ends."""
+
+    t: list[float]
+    v: list[float]
+    u: list[float]
+
+
+class LeaderSection(_Section, frozen=True, kw_only=True):
+    """The leader: its start pose (x, y, theta), its program and the limits that are known of it.
+
+    ``v_eps <= v1 <= k_v`` and ``|u1| <= k_u`` (Assumption 1 of the paper).
+    """
+
+    pose: PoseTriple
+    program: ConstantProgram | SinusoidProgram | ImpulseProgram | TableProgram
+    name: Name = "leader"
+    v_eps: Positive = 0.02
+    k_v: Positive
+    k_u: Positive
+
+
+class FollowerSection(_Section, frozen=True, kw_only=True):
+    """The follower: its start pose (x, y, theta) and its name on the wire."""
+
+    pose: PoseTriple
+    name: Name = "follower"
+
+
+class RobotSection(_Section, frozen=True, kw_only=True):
+    """The emulated robots: first-order actuator lag, limits, command resolution, wheel odometry noise."""
+
+    lag_s: NonNegative = 0.1
+    v_max: Positive = 0.22
+    u_max: Positive = 2.84
+    v_resolution: NonNegative = 0.01
+    u_resolution: NonNegative = 0.01
+    odometry_rate_hz: Rate = 30.0
+    odometry_sigma_v: NonNegative = 0.002
+    odometry_sigma_u: NonNegative = 0.01
+
+
+class MocapSection(_Section, frozen=True, kw_only=True):
+    """The emulated motion capture: noise of a moving body, the share a standing one has, delivery."""
+
+    rate_hz: Rate = 120.0
+    sigma_position: NonNegative = 0.0003
+    sigma_heading: NonNegative = 0.0035
+    static_fraction: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.05
+    latency_s: NonNegative = 0.03
+    jitter_s: NonNegative = 0.0
+    loss: Probability = 0.0
+
+
+class EstimatorSection(_Section, frozen=True, kw_only=True):
+    """The estimator: which one, what it measures with, and its noise by rule.
+
+    ``front_end`` world: leader position and follower pose from mocap; body: range and bearing of the leader
+    and the follower's own motion, taken as noisy, ``input_delay_s`` old when it is stamped, and as late as
+    ``input_lag_s`` in acting (set it where commands stand in for odometry).
+    ``sigma_range``, ``sigma_bearing``: of a body-frame sensor; for mocap they follow from the geometry.
+    ``turn_bandwidth``: q_u = turn_bandwidth * k_u^2 per second (0.5 agile, 0.03 gentle leaders).
+    """
+
+    kind: EstimatorName = "ekf"
+    front_end: FrontEnd = "world"
+    sigma_position: Positive = 0.0003
+    sigma_heading: Positive = 0.0035
+    sigma_range: Positive = 0.01
+    sigma_bearing: Positive = 0.02
+    sigma_v2: Positive = 0.005
+    sigma_u2: Positive = 0.03
+    input_delay_s: NonNegative = 0.0
+    input_lag_s: NonNegative = 0.0
+    turn_bandwidth: Positive = 0.5
+    gate_probability: Annotated[float, Meta(gt=0.5, lt=1.0)] = 0.9999
+    reacquire_frames: Annotated[int, Meta(ge=2)] = 5
+    coast_after_s: Positive = 0.25
+    lost_after_s: Positive = 1.0
+    window_s: NonNegative = 0.2
+    difference_cutoff_s: Positive = 0.1
+
+
+class Scenario(_Section, frozen=True, kw_only=True):
+    """A whole experiment. Build it with :func:`hil.scenario.files.load_scenario`."""
+
+    name: str = ""
+    description: str = ""
+    run: RunSection = RunSection()
+    formation: FormationSection
+    controller: ControllerSection
+    leader: LeaderSection
+    follower: FollowerSection
+    robot: RobotSection = RobotSection()
+    mocap: MocapSection = MocapSection()
+    estimator: EstimatorSection = EstimatorSection()

@@ -1,0 +1,152 @@
+"""Estimates to messages and back, with the error bounds that the scenario's assumptions give."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from estimation.bounds import InputErrors, Perceived, RateErrors
+from estimation.estimate import Estimate
+from estimation.guarantees import guaranteed_rate, leader_acceleration
+from estimation.live_bounds import ErrorBounds, LawConstants, live_bounds
+from estimation.tracking import Status
+from formation.spacing import Spacing
+from hil.scenario.schema import Scenario
+from hil.wire.message_types import Consumed, LeaderEstimate
+from hil.wire.messages import header, to_ns, to_time
+
+_SIGMAS = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class AssumedErrors:
+    """Error bounds taken for granted where the truth is not known: three standard deviations of each input.
+
+    ``rate`` [m/s] is the guaranteed error of the leader's velocity by noise and acceleration bounds.
+    """
+
+    rate: float
+    sd_range: float
+    sd_bearing: float
+    bearing_grows: bool
+    E_v2: float
+    E_u2: float
+    law: LawConstants
+
+    @staticmethod
+    def of(scenario: Scenario) -> AssumedErrors:
+        """Assumptions that follow from a scenario's noise and leader limits."""
+        given, leader = scenario.estimator, scenario.leader
+        mocap = given.front_end == "world"
+        sd_range = math.sqrt(2.0) * given.sigma_position if mocap else given.sigma_range
+        sd_bearing = given.sigma_heading if mocap else given.sigma_bearing
+        acceleration = float(leader_acceleration(leader.k_v, leader.k_u))
+        return AssumedErrors(
+            rate=float(guaranteed_rate(_SIGMAS * sd_range, acceleration)),
+            sd_range=sd_range,
+            sd_bearing=sd_bearing,
+            bearing_grows=mocap,
+            E_v2=_SIGMAS * given.sigma_v2,
+            E_u2=_SIGMAS * given.sigma_u2,
+            law=LawConstants(
+                leader.v_eps,
+                scenario.controller.mu1,
+                Spacing(scenario.formation.rho_0, scenario.controller.mu_rho),
+            ),
+        )
+
+    def errors(self, rho: float) -> ErrorBounds:
+        """Bounds on the errors of rates and inputs at a distance rho [m] > 0."""
+        sd_bearing = (
+            math.hypot(self.sd_range / rho, self.sd_bearing) if self.bearing_grows else self.sd_bearing
+        )
+        return ErrorBounds(
+            M_rho=self.rate + self.E_v2,
+            M_alpha2=self.rate / rho + self.E_u2,
+            E_rho=_SIGMAS * self.sd_range,
+            E_alpha2=_SIGMAS * sd_bearing,
+            E_v2=self.E_v2,
+            E_u2=self.E_u2,
+        )
+
+    def at(self, rho: float) -> tuple[RateErrors, InputErrors]:
+        """The same as :meth:`errors`, for the bounds on arrays."""
+        errors = self.errors(rho)
+        inputs = InputErrors(errors.E_rho, errors.E_alpha2, errors.E_v2, errors.E_u2)
+        return RateErrors(errors.M_rho, errors.M_alpha2), inputs
+
+
+def perceived(estimate: Estimate) -> Perceived:
+    """What the bounds need of an estimate."""
+    return Perceived(
+        rho=estimate.rho,
+        alpha2=estimate.alpha2,
+        rho_dot=estimate.rho_dot,
+        alpha2_dot=estimate.alpha2_dot,
+        v1=estimate.v1,
+        alpha1=estimate.alpha1,
+        v2=estimate.v2,
+        u2=estimate.u2,
+    )
+
+
+def to_message(
+    estimate: Estimate,
+    now_ns: int,
+    frame_id: str,
+    reason: str,
+    assumed: AssumedErrors,
+    receipts: Sequence[Consumed],
+) -> LeaderEstimate:
+    """Message of an estimate made at ``now_ns``, with its extended bounds."""
+    bound_v1, bound_alpha1, bound_h = live_bounds(
+        (estimate.rho, estimate.alpha2),
+        (estimate.v1, estimate.alpha1),
+        (estimate.v2, estimate.u2),
+        estimate.alpha2_dot,
+        assumed.errors(max(estimate.rho, 1e-6)),
+        assumed.law,
+    )
+    return LeaderEstimate(
+        header=header(estimate.capture_ns, frame_id),
+        measured=to_time(estimate.measured_ns),
+        computed=to_time(now_ns),
+        rho=estimate.rho,
+        alpha2=estimate.alpha2,
+        rho_dot=estimate.rho_dot,
+        alpha2_dot=estimate.alpha2_dot,
+        v1=estimate.v1,
+        alpha1=estimate.alpha1,
+        u1=estimate.u1,
+        v2=estimate.v2,
+        u2=estimate.u2,
+        covariance=estimate.covariance.reshape(25),
+        nis=estimate.nis,
+        status=int(estimate.status),
+        reason=reason,
+        bound_v1=bound_v1,
+        bound_alpha1=bound_alpha1,
+        bound_h=bound_h,
+        consumed=receipts,
+    )
+
+
+def from_message(message: LeaderEstimate) -> Estimate:
+    """Estimate that a message tells of; raises ValueError for a status that does not exist."""
+    return Estimate(
+        capture_ns=to_ns(message.header.stamp),
+        measured_ns=to_ns(message.measured),
+        rho=message.rho,
+        alpha2=message.alpha2,
+        rho_dot=message.rho_dot,
+        alpha2_dot=message.alpha2_dot,
+        v1=message.v1,
+        alpha1=message.alpha1,
+        u1=message.u1,
+        v2=message.v2,
+        u2=message.u2,
+        covariance=message.covariance.reshape(5, 5),
+        nis=message.nis,
+        status=Status(message.status),
+    )

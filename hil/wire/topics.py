@@ -1,0 +1,96 @@
+"""Topics of a scenario: their names on the wire (a ROS topic without its leading slash) and their types."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hil.scenario.schema import Scenario
+from hil.wire.message_types import (
+    Command,
+    DiagnosticArray,
+    LeaderEstimate,
+    Malformed,
+    Odometry,
+    RangeBearing,
+    RigidBodies,
+    String,
+    Truth,
+    Twist,
+    TwistStamped,
+)
+from hil.wire.messages import typename_of
+
+RIGID_BODIES = "rigid_bodies"
+TRUTH = "truth"
+DIAGNOSTICS = "diagnostics"
+STOP = "stop"
+MALFORMED = "malformed"
+
+
+@dataclass(frozen=True, slots=True)
+class Topics:
+    """The topics of one leader and one follower."""
+
+    leader: str
+    follower: str
+    stamped: bool
+
+    @property
+    def leader_odom(self) -> str:
+        """Wheel odometry of the leader; the follower does not read it."""
+        return f"{self.leader}/odom"
+
+    @property
+    def leader_cmd_vel(self) -> str:
+        """What the leader is told to drive; read by the law ``ideal`` only, which needs its turn rate."""
+        return f"{self.leader}/cmd_vel"
+
+    @property
+    def odom(self) -> str:
+        """Wheel odometry of the follower."""
+        return f"{self.follower}/odom"
+
+    @property
+    def cmd_vel(self) -> str:
+        """What the follower is told to drive."""
+        return f"{self.follower}/cmd_vel"
+
+    @property
+    def sighting(self) -> str:
+        """Range and bearing of the leader from a sensor on the follower."""
+        return f"{self.follower}/leader_sighting"
+
+    @property
+    def estimate(self) -> str:
+        """What the follower believes of the leader."""
+        return f"{self.follower}/leader_estimate"
+
+    @property
+    def command(self) -> str:
+        """The controller's decision with its reasons."""
+        return f"{self.follower}/command"
+
+    @property
+    def types(self) -> dict[str, str]:
+        """Type name of every topic."""
+        drive = TwistStamped if self.stamped else Twist
+        return {
+            RIGID_BODIES: typename_of(RigidBodies),
+            self.leader_odom: typename_of(Odometry),
+            self.odom: typename_of(Odometry),
+            self.leader_cmd_vel: typename_of(drive),
+            self.cmd_vel: typename_of(drive),
+            self.sighting: typename_of(RangeBearing),
+            self.estimate: typename_of(LeaderEstimate),
+            self.command: typename_of(Command),
+            TRUTH: typename_of(Truth),
+            DIAGNOSTICS: typename_of(DiagnosticArray),
+            STOP: typename_of(String),
+            MALFORMED: typename_of(Malformed),
+        }
+
+
+def topics_of(scenario: Scenario) -> Topics:
+    """Topics of a scenario."""
+    stamped = scenario.controller.command_type == "TwistStamped"
+    return Topics(scenario.leader.name, scenario.follower.name, stamped)

@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+
+from hil.figures.panel_strokes import LIMIT
+from hil.figures.run_figures import draw_run
+from hil.figures.run_panels import Shown, draw_alpha1_error, draw_v1, draw_v2, panels_for
+from hil.judge.columns import columns_of
+from hil.judge.evidence import Evidence, evidence_of_log
+from hil.judge.summary import summarise
+from hil.log.reader import Log
+
+NAN = math.nan
+LARGEST_BYTES = 200_000
+
+
+@pytest.fixture
+def axes() -> Axes:
+    figure = Figure()
+    FigureCanvasAgg(figure)
+    return figure.add_subplot()
+
+
+def shown(evidence: Evidence) -> Shown:
+    return Shown.of(evidence, columns_of(evidence), None)
+
+
+def drawn(evidence: Evidence, path: Path) -> Image.Image:
+    draw_run(evidence, summarise(evidence), path)
+    assert path.stat().st_size < LARGEST_BYTES
+    with Image.open(path) as image:
+        return image.convert("RGB")
+
+
+def ink(image: Image.Image) -> float:
+    """Share of the picture that is not white."""
+    return float(np.mean(np.any(np.asarray(image) < 250, axis=2)))
+
+
+def test_a_run_is_drawn_small_and_the_same_every_time(short_log: Log, tmp_path: Path) -> None:
+    evidence = evidence_of_log(short_log)
+    first, again = drawn(evidence, tmp_path / "a.png"), drawn(evidence, tmp_path / "b.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert first.size == again.size
+    assert first.getpixel((0, 0)) == (255, 255, 255)
+    assert ink(first) > 0.05
+
+
+def lacks_nothing(evidence: Evidence) -> Evidence:
+    return evidence
+
+
+def lacks_speeds(evidence: Evidence) -> Evidence:
+    poses = [replace(each, v1=NAN, u1=NAN, v2=NAN, u2=NAN) for each in evidence.truth]
+    return replace(evidence, truth=poses, commands=[], motion_since_ns=None, frames=None)
+
+
+def lacks_truth(evidence: Evidence) -> Evidence:
+    return replace(evidence, truth=[], commands=[], motion_since_ns=None, frames=None)
+
+
+def lacks_estimates(evidence: Evidence) -> Evidence:
+    return replace(evidence, estimates=[])
+
+
+def lacks_all(evidence: Evidence) -> Evidence:
+    return replace(lacks_truth(evidence), estimates=[])
+
+
+@pytest.mark.parametrize(
+    ("lack", "panels"),
+    [
+        (lacks_nothing, (1, 4, 4)),
+        (lacks_speeds, (0, 3, 3)),
+        (lacks_truth, (0, 3, 2)),
+        (lacks_estimates, (1, 3, 2)),
+        (lacks_all, (0, 0, 0)),
+    ],
+)
+def test_what_is_not_known_is_left_out(
+    exact_evidence: Evidence, tmp_path: Path, lack: object, panels: tuple[int, int, int]
+) -> None:
+    assert callable(lack)
+    evidence = lack(exact_evidence)
+    assert tuple(map(len, panels_for(shown(evidence)))) == panels
+    assert ink(drawn(evidence, tmp_path / "run.png")) > 0.0
+
+
+def marks(axes: Axes) -> list[int]:
+    """Number of points of every set of crosses in the colour of a limit."""
+    lines = [line for line in axes.lines if line.get_marker() == "x" and line.get_color() == LIMIT]
+    return [len(np.asarray(line.get_xdata())) for line in lines]
+
+
+def test_violations_are_marked(axes: Axes, exact_evidence: Evidence) -> None:
+    estimates = list(exact_evidence.estimates)
+    for number in (100, 150, 151):
+        estimates[number] = replace(
+            estimates[number], v1=estimates[number].v1 + 0.01, alpha1=estimates[number].alpha1 + 0.1
+        )
+    evidence = replace(exact_evidence, estimates=estimates)
+    draw_v1(axes, shown(evidence))
+    assert marks(axes) == [3]
+    assert "violated (3)" in [str(line.get_label()) for line in axes.lines]
+    draw_alpha1_error(axes, shown(evidence))
+    assert marks(axes) == [3, 3]
+
+
+def test_no_violation_leaves_no_mark(axes: Axes, exact_evidence: Evidence) -> None:
+    draw_v1(axes, shown(exact_evidence))
+    draw_alpha1_error(axes, shown(exact_evidence))
+    assert marks(axes) == []
+
+
+def test_no_line_is_drawn_across_a_gap(axes: Axes, exact_evidence: Evidence) -> None:
+    silent = [each for k, each in enumerate(exact_evidence.estimates) if not 100 <= k < 160]
+    draw_v1(axes, shown(replace(exact_evidence, estimates=silent)))
+    line = next(line for line in axes.lines if line.get_label() == "estimate")
+    assert np.count_nonzero(np.isnan(np.asarray(line.get_ydata(), dtype=float))) == 1
+    (band,) = axes.collections
+    assert len(band.get_paths()) == 2
+
+
+def test_limits_of_a_command_show_where_they_matter(axes: Axes, exact_evidence: Evidence) -> None:
+    draw_v2(axes, shown(exact_evidence))
+    heights = [np.asarray(line.get_ydata(), dtype=float).tolist() for line in axes.lines]
+    assert [0.22, 0.22] in heights
+    assert [-0.22, -0.22] not in heights

@@ -1,0 +1,105 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from hil.errors import UsageError
+from hil.judge.evidence import Evidence, Frames, Span, evaluation_span, evidence_of_log, run_span
+from hil.log.metadata import log_metadata
+from hil.log.reader import Log, read_log
+from hil.log.writer import LogWriter
+from hil.nodes.node import digest
+from hil.wire import topics
+from hil.wire.message_types import Consumed, RigidBodies
+from hil.wire.messages import encode, header, to_ns, to_time, typename_of
+
+SECOND = 1_000_000_000
+
+
+def test_a_log_gives_back_what_the_run_did(short_log: Log) -> None:
+    evidence = evidence_of_log(short_log)
+    assert (evidence.mode, evidence.scenario.run.seed) == ("lockstep", 7)
+    assert evidence.motion_since_ns == evidence.zero_ns
+    assert run_span(evidence).seconds == pytest.approx(6.0)
+    assert evidence.stopped_ns == run_span(evidence).to_ns
+    assert evidence.taken["frames"] == len(evidence.estimates)
+    assert evidence.taken["used"] + evidence.refused.get("gated", 0) == evidence.taken["frames"]
+    assert evidence.log is not None
+    assert evidence.log.messages == short_log.messages
+    assert evidence.log.bytes == short_log.path.stat().st_size
+
+
+def test_every_captured_frame_is_received_or_lost(short_log: Log) -> None:
+    evidence = evidence_of_log(short_log)
+    assert evidence.frames is not None
+    assert evidence.frames.received == evidence.taken["frames"]
+    captured = [to_ns(each.header.stamp) for each in evidence.truth]
+    first, last = evidence.frames.captures_ns[0], evidence.frames.captures_ns[-1]
+    assert evidence.frames.published == sum(first <= moment <= last for moment in captured)
+    assert 0.01 < 1.0 - evidence.frames.received / evidence.frames.published < 0.1
+
+
+def frames_log(path: Path, evidence: Evidence, numbers: Sequence[int], got: Sequence[int]) -> Log:
+    """A log without truth of frames with the given numbers, each sent twice, with receipts for some."""
+    frames = {number: RigidBodies(header(number * SECOND, "mocap"), number, []) for number in numbers}
+    payloads = {number: encode(frame) for number, frame in frames.items()}
+    receipts = [Consumed(digest(topics.RIGID_BODIES, payloads[number]), to_time(0)) for number in got]
+    estimate = replace(evidence.estimates[0], consumed=receipts)
+    with LogWriter(path, log_metadata(evidence.scenario, "live")) as log:
+        for number, payload in payloads.items():
+            for _ in range(2):
+                log.write(topics.RIGID_BODIES, typename_of(RigidBodies), payload, number, number)
+        log.write("follower/leader_estimate", typename_of(estimate), encode(estimate), 99, 99)
+    return read_log(path)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "got", "published"),
+    [
+        ([10, 11, 12, 13, 14], [10, 11, 13, 14], 5),  # one did not arrive
+        ([10, 11, 12, 15, 16], [10, 11, 12, 15, 16], 7),  # two never left the mocap
+        ([10, 12, 14, 18, 20], [10, 12, 14, 18, 20], 6),  # a mocap that sends every second frame
+        ([10, 11, 12, 13, 14], [11, 12, 13], 3),  # before the first and after the last does not count
+    ],
+)
+def test_frames_without_truth_are_counted_by_their_numbers(
+    tmp_path: Path, exact_evidence: Evidence, numbers: list[int], got: list[int], published: int
+) -> None:
+    log = frames_log(tmp_path / "run.mcap", exact_evidence, numbers, got)
+    assert evidence_of_log(log).frames == Frames(published, [number * SECOND for number in got])
+
+
+def test_a_log_that_tells_no_scenario_needs_one(tmp_path: Path, exact_evidence: Evidence) -> None:
+    with LogWriter(tmp_path / "bare.mcap", {}):
+        pass
+    log = read_log(tmp_path / "bare.mcap")
+    with pytest.raises(UsageError, match="scenario"):
+        evidence_of_log(log)
+    found = evidence_of_log(log, exact_evidence.scenario)
+    assert (len(found.estimates), found.frames, found.motion_since_ns) == (0, None, None)
+
+
+def test_a_run_ends_with_the_stop_or_its_duration(exact_evidence: Evidence) -> None:
+    start = exact_evidence.zero_ns
+    assert run_span(exact_evidence).seconds == pytest.approx(4.0, abs=1e-6)
+    stopped = replace(exact_evidence, stopped_ns=start + 2 * SECOND)
+    assert run_span(stopped) == Span(start, start + 2 * SECOND)
+    crashed = replace(
+        exact_evidence, estimates=exact_evidence.estimates[:60], truth=exact_evidence.truth[:90]
+    )
+    assert run_span(crashed).to_ns == to_ns(exact_evidence.truth[89].header.stamp)
+
+
+def test_what_is_judged(exact_evidence: Evidence) -> None:
+    start = exact_evidence.zero_ns
+    assert evaluation_span(exact_evidence).from_ns == start + SECOND
+    asked = replace(exact_evidence, evaluate_from_ns=start + 7, evaluate_to_ns=start + 9)
+    assert evaluation_span(asked) == Span(start + 7, start + 9)
+    short = replace(exact_evidence, stopped_ns=start + SECOND // 2)
+    assert evaluation_span(short) == Span(start + SECOND // 4, start + SECOND // 2)
+    recorded = replace(exact_evidence, motion_since_ns=None, stopped_ns=None)
+    last = to_ns(exact_evidence.estimates[-1].header.stamp)
+    assert evaluation_span(recorded) == Span(start + SECOND, last)

@@ -1,0 +1,66 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controllers.laws import LAWS
+from formation.closed_loop import Trajectory, simulate_pair
+from formation.pose import Motion
+from formation.shape import Shape
+from hil.judge.evidence import Span
+from hil.judge.noise_free_orbit import noise_free_orbit
+from hil.judge.true_states import TrueStates
+from hil.scenario.files import load_scenario
+from hil.scenario.parts import gains, leader_program, limits, noise_free_run, start_poses
+
+T0 = 1_700_000_000_000_000_000
+
+
+def told(run: Trajectory) -> tuple[TrueStates, Span]:
+    """The truth of a run as an emulator would have told it."""
+    stamps = T0 + np.round(run.t * 1e9).astype(np.int64)
+    shape = (run.rho, run.alpha1, run.alpha2, run.rho * np.nan, run.rho * np.nan)
+    truth = TrueStates(stamps, run.leader, run.follower, run.v1, run.u1, run.v2, run.u2, *shape)
+    return truth, Span(T0, int(stamps[-1]))
+
+
+@pytest.mark.parametrize("name", ["turtlebot3", "fig2-independent"])
+def test_agrees_with_the_accurate_simulation_where_no_limit_is_met(name: str) -> None:
+    scenario = load_scenario(name, ["controller.v_max=9.0", "controller.u_max=9.0"])
+    run = noise_free_run(scenario, np.linspace(0.0, 8.0, 961))
+    orbit = noise_free_orbit(scenario, *told(run))
+    assert orbit is not None
+    rho, alpha1, alpha2 = orbit.at(told(run)[0].capture_ns)
+    assert np.max(np.abs(rho - run.rho)) < 2e-4 * run.rho.max()
+    assert np.max(np.abs(np.sin(alpha1 - run.alpha1))) < 1e-3
+    assert np.max(np.abs(np.sin(alpha2 - run.alpha2))) < 1e-3
+
+
+def test_keeps_to_the_limits_of_the_controller() -> None:
+    """The law is told of the limits, and so steers by the speed that they let through."""
+    scenario = load_scenario("turtlebot3", ["controller.v_max=0.15", "controller.u_max=0.5"])
+    law, with_gains, within = LAWS[scenario.controller.law], gains(scenario), limits(scenario)
+
+    def limited(shape: Shape, v1: float, u1: float) -> Motion:
+        return within.apply(law(shape, v1, u1, with_gains, within))[0]
+
+    times = np.linspace(0.0, 6.0, 721)
+    run = simulate_pair(*start_poses(scenario), leader_program(scenario), limited, times)
+    assert np.mean(run.v2 == 0.15) > 0.2
+    orbit = noise_free_orbit(scenario, *told(run))
+    assert orbit is not None
+    rho, alpha1, alpha2 = orbit.at(told(run)[0].capture_ns)
+    assert np.max(np.abs(rho - run.rho)) < 2e-4
+    assert np.max(np.abs(alpha1 - run.alpha1)) < 1e-3
+    assert np.max(np.abs(alpha2 - run.alpha2)) < 1e-3
+
+
+def test_nothing_to_go_by_gives_no_orbit() -> None:
+    scenario = load_scenario("turtlebot3")
+    truth, span = told(noise_free_run(scenario, np.linspace(0.0, 1.0, 61)))
+    unknown = replace(truth, v1=np.full(61, math.nan))
+    assert noise_free_orbit(scenario, unknown, span) is None
+    assert noise_free_orbit(scenario, truth, Span(0, 1)) is None

@@ -1,0 +1,186 @@
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.tracking import Status
+from hil.judge.evidence import Evidence, evidence_of_log
+from hil.judge.summary import summarise
+from hil.log.reader import Log
+from hil.report_json import as_json
+from hil.wire.messages import to_ns, to_time
+
+QUANTITIES = {"rho_dot", "alpha2_dot", "v1", "alpha1", "u1"}
+BOUNDS = {
+    "v1",
+    "alpha1",
+    "h",
+    "v1_extended",
+    "alpha1_extended",
+    "h_extended",
+    "paper_alpha1",
+    "paper_h",
+}
+NAN = math.nan
+
+
+@pytest.fixture(scope="module")
+def judged(short_log: Log) -> dict[str, Any]:
+    return summarise(evidence_of_log(short_log))
+
+
+def without_truth(evidence: Evidence) -> Evidence:
+    """As another lab's recording: nobody knows the truth, nothing drove the robots."""
+    return replace(evidence, truth=[], commands=[], motion_since_ns=None, frames=None, refused={})
+
+
+def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
+    parts = {key: set(value) for key, value in judged.items() if isinstance(value, dict)}
+    assert parts == {
+        "frames": {"published", "received", "used", "lost", "late", "rejected"},
+        "estimation": {
+            *("evaluated_from_s", "samples", "untracked", "settle_s", "nis_mean"),
+            *("rmse", "max", "efficiency", "coverage_3sigma"),
+        },
+        "bounds": {"M_rho", "M_alpha2", "v_eps", "checked", "violations", "tightness"},
+        "formation": {
+            *("rho_final", "alpha1_final", "alpha2_final", "rho_min", "rho_max"),
+            "orbit_deviation_rms",
+        },
+        "latency_ms": {"capture_to_command"},
+        "commands": {"sent", "saturated", "stopped"},
+        "rejected": parts["rejected"],
+        "log": {"path", "messages", "bytes"},
+    }
+    assert set(judged) - set(parts) == {"scenario", "seed", "mode", "estimator", "law", "duration_s"}
+    for name in ("rmse", "max", "efficiency", "coverage_3sigma"):
+        assert set(judged["estimation"][name]) == QUANTITIES
+    assert set(judged["bounds"]["violations"]) == BOUNDS
+    assert set(judged["formation"]["orbit_deviation_rms"]) == {"rho", "alpha1"}
+    assert set(judged["latency_ms"]["capture_to_command"]) == {"p50", "p99", "max"}
+    assert as_json(judged)
+
+
+def test_a_short_run_is_as_good_as_it_should_be(judged: dict[str, Any]) -> None:
+    estimation, bounds = judged["estimation"], judged["bounds"]
+    assert judged["duration_s"] == pytest.approx(6.0)
+    assert estimation["evaluated_from_s"] == pytest.approx(3.0)
+    assert 320 < estimation["samples"] <= 361
+    assert estimation["settle_s"] < 0.5
+    assert 1.5 < estimation["nis_mean"] < 2.3
+    assert 0.0005 < estimation["rmse"]["v1"] < 0.004
+    assert 0.005 < estimation["rmse"]["alpha1"] < math.radians(3.0)
+    assert all(0.3 < share < 1.3 for share in estimation["efficiency"].values())
+    assert all(share > 0.98 for share in estimation["coverage_3sigma"].values())
+    assert bounds["checked"] == estimation["samples"]
+    assert [bounds["violations"][name] for name in BOUNDS if name.endswith("_extended")] == [0, 0, 0]
+    assert bounds["M_rho"] == estimation["max"]["rho_dot"]
+    assert bounds["M_alpha2"] == estimation["max"]["alpha2_dot"]
+    assert judged["formation"]["orbit_deviation_rms"]["rho"] < 0.03
+    assert judged["latency_ms"]["capture_to_command"]["p50"] == pytest.approx(30.0, abs=0.1)
+    frames = judged["frames"]
+    assert frames["published"] - frames["received"] == frames["lost"] > 0
+
+
+def test_exact_estimates_have_no_error(exact_evidence: Evidence) -> None:
+    summary = summarise(exact_evidence)
+    assert all(value < 1e-9 for value in summary["estimation"]["rmse"].values())
+    assert set(summary["estimation"]["coverage_3sigma"].values()) == {1.0}
+    assert summary["estimation"]["settle_s"] == 0.0
+    assert summary["estimation"]["nis_mean"] == 2.0
+    assert set(summary["bounds"]["violations"].values()) == {0}
+    assert summary["formation"]["rho_final"] == pytest.approx(0.2)
+    assert summary["formation"]["alpha1_final"] == pytest.approx(-0.5 * math.pi)
+
+
+def test_latency_is_from_capture_to_the_first_command_on_it(exact_evidence: Evidence) -> None:
+    commands = [
+        replace(each, capture=to_time(to_ns(each.header.stamp) - 1_000_000 * number), fresh=number % 2 == 1)
+        for number, each in enumerate(exact_evidence.commands)
+    ]
+    waits = np.arange(1.0, 239.0, 2.0)  # the last command comes after the end of the run
+    found = summarise(replace(exact_evidence, commands=commands))["latency_ms"]["capture_to_command"]
+    assert found["p50"] == pytest.approx(np.percentile(waits, 50))
+    assert found["p99"] == pytest.approx(np.percentile(waits, 99))
+    assert found["max"] == 237.0
+
+
+def test_commands_after_the_stop_do_not_count(exact_evidence: Evidence) -> None:
+    middle = to_ns(exact_evidence.commands[100].header.stamp)
+    commands = [
+        replace(each, saturated=number < 30, stop="stale" if 10 <= number < 15 else "")
+        for number, each in enumerate(exact_evidence.commands)
+    ]
+    found = summarise(replace(exact_evidence, commands=commands, stopped_ns=middle))
+    assert found["commands"] == {"sent": 100, "saturated": 30, "stopped": 5}
+
+
+def test_frames_add_up(exact_evidence: Evidence) -> None:
+    assert exact_evidence.frames is not None
+    frames = replace(exact_evidence.frames, published=250)
+    refused = {"gated": 1, "not_finite": 3, "unknown_body": 241}
+    found = summarise(replace(exact_evidence, frames=frames, refused=refused))
+    assert found["rejected"] == refused
+    assert found["frames"] == {
+        "published": 250,
+        "received": 241,
+        "used": 240,
+        "lost": 9,
+        "late": 0,
+        "rejected": 4,
+    }
+
+
+def test_what_nobody_knows_is_absent(exact_evidence: Evidence) -> None:
+    summary = summarise(without_truth(exact_evidence))
+    assert set(summary) == {
+        *("scenario", "mode", "estimator", "duration_s", "frames", "estimation", "bounds", "log")
+    }
+    assert set(summary["estimation"]) == {
+        *("evaluated_from_s", "samples", "untracked", "settle_s", "nis_mean")
+    }
+    assert set(summary["bounds"]) == {"M_rho", "M_alpha2", "v_eps", "checked"}
+    assert summary["bounds"]["checked"] == 0
+    assert set(summary["frames"]) == {"received", "used", "late", "rejected"}
+
+
+def test_a_recording_that_knows_poses_only_is_judged_on_what_follows_from_them(
+    exact_evidence: Evidence,
+) -> None:
+    poses = [replace(each, v1=NAN, u1=NAN, v2=NAN, u2=NAN) for each in exact_evidence.truth]
+    summary = summarise(replace(exact_evidence, truth=poses, motion_since_ns=None))
+    assert set(summary["estimation"]["rmse"]) == {"alpha1"}
+    assert "efficiency" not in summary["estimation"]
+    assert summary["bounds"]["checked"] == 0
+    assert "orbit_deviation_rms" not in summary["formation"]
+    assert summary["formation"]["rho_max"] == pytest.approx(0.2)
+
+
+def test_only_what_says_tracking_is_judged(exact_evidence: Evidence) -> None:
+    wild = [
+        replace(each, status=int(Status.COASTING), v1=9.0) if 100 <= number < 110 else each
+        for number, each in enumerate(exact_evidence.estimates)
+    ]
+    late = [replace(each, status=int(Status.INITIALISING)) for each in wild[:30]]
+    found = summarise(replace(exact_evidence, estimates=late + wild[30:]))["estimation"]
+    assert found["untracked"] == 10
+    assert found["max"]["v1"] < 1e-9
+    assert found["settle_s"] == pytest.approx(0.5, abs=1e-6)
+
+
+def test_no_estimates_at_all_still_give_a_summary(exact_evidence: Evidence) -> None:
+    summary = summarise(replace(exact_evidence, estimates=[]))
+    assert summary["estimation"] == {"evaluated_from_s": pytest.approx(1.0), "samples": 0, "untracked": 0}
+    assert summary["bounds"]["checked"] == 0
+    assert summarise(replace(without_truth(exact_evidence), estimates=[]))["duration_s"] == 0.0
+
+
+def test_judging_needs_no_pictures() -> None:
+    code = "import sys, hil.judge.summary; sys.exit('matplotlib' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+import copy
+import io
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from hil.judge.evidence import Evidence
+from hil.judge.summary import summarise
+from hil.judge.summary_text import print_summary, warnings_of
+
+
+@pytest.fixture
+def summary(exact_evidence: Evidence) -> dict[str, Any]:
+    found = copy.deepcopy(summarise(exact_evidence))
+    del found["rejected"]
+    return found
+
+
+def printed(summary: dict[str, Any]) -> str:
+    text = io.StringIO()
+    print_summary(summary, Console(file=text, width=80))
+    return text.getvalue()
+
+
+def test_a_good_run_is_told_without_warnings(summary: dict[str, Any]) -> None:
+    assert warnings_of(summary) == []
+    text = printed(summary)
+    assert "turtlebot3, lockstep, 4.0 s (ekf, independent law, seed 1)" in text
+    assert "violated nowhere in 180 samples" in text
+    assert "capture to command 30.0 ms" in text
+    assert "!" not in text
+
+
+@pytest.mark.parametrize(
+    ("part", "change", "said"),
+    [
+        ("estimation", {"samples": 0}, "nothing to judge"),
+        ("estimation", {"untracked": 20}, "20 of 200 estimates"),
+        ("estimation", {"coverage_3sigma": {"v1": 0.9}}, "too sure of v1: only 90.0%"),
+        ("estimation", {"nis_mean": 9.0}, "noisier than the scenario says (mean NIS 9"),
+        ("estimation", {"nis_mean": 0.1}, "quieter than the scenario says"),
+        ("bounds", {"violations": {"v1": 5, "v1_extended": 3}}, "v1_extended does not hold in 3 samples"),
+        ("frames", {"lost": 24, "published": 240}, "10.0% of the frames never reached"),
+        ("commands", {"saturated": 200, "sent": 240}, "83% of the commands were at a limit"),
+        (
+            "commands",
+            {"stopped": 24, "sent": 240},
+            "in 10% of the commands the robot was told to stand still",
+        ),
+        ("formation", {"orbit_deviation_rms": {"rho": 0.3}}, "the distance is 0.3 m RMS off"),
+        ("rejected", {"not_finite": 3, "gated": 1}, "inputs refused: gated 1, not finite 3"),
+    ],
+)
+def test_what_deserves_a_second_look_is_said(
+    summary: dict[str, Any], part: str, change: dict[str, Any], said: str
+) -> None:
+    summary[part] = summary.get(part, {}) | change
+    (warning,) = warnings_of(summary)
+    assert said in warning
+    assert f"! {warning}" in printed(summary)
+
+
+def test_a_replay_tells_its_parity(summary: dict[str, Any]) -> None:
+    summary["parity"] = {
+        "estimates": {"compared": 100, "mismatched": 0},
+        "commands": {"compared": 50, "mismatched": 2},
+    }
+    assert "150 messages compared, 2 differ" in printed(summary)
+
+
+def test_a_recording_without_truth_has_little_to_tell(exact_evidence: Evidence) -> None:
+    bare = Evidence(exact_evidence.scenario, "replay", [])
+    text = printed(summarise(bare))
+    assert "turtlebot3, replay, 0.0 s (ekf)" in text
+    assert "nothing to judge" in text

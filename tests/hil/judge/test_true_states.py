@@ -1,0 +1,72 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hil.judge.true_states import LONGEST_GAP_NS, TrueStates
+from hil.wire.message_types import Truth
+from hil.wire.messages import header, to_ns
+
+T0 = 1_700_000_000_000_000_000
+STEP = 100_000_000
+
+
+def truth(moment_ns: int, theta: float = 0.0) -> Truth:
+    """Follower 0.2 m to the right of a leader at the origin that heads along theta."""
+    x, y = 0.2 * math.cos(theta - 0.5 * math.pi), 0.2 * math.sin(theta - 0.5 * math.pi)
+    return Truth(header(moment_ns, "mocap"), 0, 0.0, 0.0, theta, 0.08, 0.1, x, y, theta, 0.1, 0.1)
+
+
+def at(states: TrueStates, *moments_ns: int) -> TrueStates:
+    return states.at(np.array(moments_ns, dtype=np.int64))
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(-2.0, 2.0), st.floats(0.0, 1.0))
+def test_a_heading_between_two_turns_the_short_way(theta: float, turn: float, share: float) -> None:
+    first = replace(truth(T0), leader_theta=theta)
+    second = replace(truth(T0 + STEP), leader_theta=math.remainder(theta + turn, math.tau))
+    moment = T0 + round(share * STEP)
+    heading = float(at(TrueStates.of([first, second]), moment).leader[0, 2])
+    expected = theta + turn * (moment - T0) / STEP
+    assert math.remainder(heading - expected, math.tau) == pytest.approx(0.0, abs=1e-12)
+    assert -math.pi < heading <= math.pi
+
+
+def test_a_moment_with_a_truth_gets_that_truth_bit_for_bit() -> None:
+    told = [truth(T0 + k * STEP, theta=0.1 * k) for k in range(5)]
+    states = TrueStates.of(told)
+    same = at(states, *(to_ns(each.header.stamp) for each in told))
+    for name in ("leader", "follower", "v1", "rho", "alpha1", "alpha2", "rho_dot", "alpha2_dot"):
+        np.testing.assert_array_equal(getattr(same, name), getattr(states, name))
+
+
+def test_nothing_is_known_outside_and_in_long_gaps() -> None:
+    states = TrueStates.of([truth(T0), truth(T0 + STEP), truth(T0 + STEP + LONGEST_GAP_NS + 1)])
+    found = at(states, T0 - 1, T0 + STEP // 2, T0 + 2 * STEP, T0 + STEP + LONGEST_GAP_NS + 2)
+    assert np.isfinite(found.rho).tolist() == [False, True, False, False]
+    assert not np.any(np.isfinite(at(TrueStates.of([]), T0).rho))
+
+
+def test_unknown_speeds_leave_the_shape_known() -> None:
+    states = TrueStates.of([replace(truth(T0), v1=math.nan, v2=math.nan)])
+    assert states.rho[0] == pytest.approx(0.2)
+    assert states.alpha1[0] == pytest.approx(-0.5 * math.pi)
+    assert math.isnan(states.rho_dot[0])
+    assert math.isnan(states.alpha2_dot[0])
+
+
+def test_two_robots_in_one_place_have_no_shape() -> None:
+    states = TrueStates.of([replace(truth(T0), follower_x=0.0, follower_y=0.0), truth(T0 + STEP)])
+    assert np.isfinite(states.rho).tolist() == [False, True]
+
+
+def test_order_and_doubles_do_not_matter() -> None:
+    late, early = truth(T0 + STEP, theta=1.0), truth(T0)
+    states = TrueStates.of([late, early, replace(early, v1=9.0)])
+    assert states.capture_ns.tolist() == [T0, T0 + STEP]
+    assert states.v1.tolist() == [0.08, 0.08]
