@@ -51,15 +51,15 @@ class ExtendedFilter:
 
 
 class UnscentedFilter:
-    """Sigma-point filter: eleven points carry mean and covariance through the exact motion.
+    """Sigma-point filter: ten points carry mean and covariance through the exact motion.
 
-    The points are spread by alpha = 0.5, beta = 2, kappa = 0, so that the centre weight stays moderate and
-    the covariance positive definite.
+    With alpha = 1, beta = 0, kappa = 0 the centre has no weight and the others are equal: the cubature rule,
+    whose covariance is a sum of squares and so never loses its positive definiteness.
     """
 
     def __init__(self, model: Model) -> None:
         self.model = model
-        points = MerweScaledSigmaPoints(STATE_SIZE, alpha=0.5, beta=2.0, kappa=0.0)
+        points = MerweScaledSigmaPoints(STATE_SIZE, alpha=1.0, beta=0.0, kappa=0.0)
         self._carrier = UnscentedKalmanFilter(
             dim_x=STATE_SIZE, dim_z=2, dt=0.0, hx=_position_of, fx=model.propagate, points=points
         )
@@ -82,7 +82,11 @@ class UnscentedFilter:
         carrier.x, carrier.P = belief.mean, belief.covariance
         carrier.sigmas_f = carrier.points_fn.sigma_points(belief.mean, belief.covariance)
         carrier.update(measurement.position, R=measurement.covariance)
-        return Belief(carrier.x, _symmetric(carrier.P))
+        # The measurement is linear, so the Joseph form is the same covariance as filterpy's P - K S K', and
+        # unlike that difference it cannot lose its positive definiteness.
+        rest = np.eye(STATE_SIZE) - carrier.K @ _POSITION
+        covariance = rest @ belief.covariance @ rest.T + carrier.K @ measurement.covariance @ carrier.K.T
+        return Belief(carrier.x, _symmetric(covariance))
 
 
 def _position_jacobian(_mean: Vector) -> Matrix:
