@@ -44,7 +44,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         def say_ready() -> None:
             click.echo(f"abreast {name}: ready, {chosen.name} on {endpoints.describe()}", err=True)
 
-        run_daemon(
+        dropped = run_daemon(
             lambda: _WORKERS[name](chosen, out, needed),
             topics_of(chosen),
             endpoints,
@@ -52,6 +52,8 @@ def daemon_command(name: str, summary: str) -> click.Command:
             duration,
             say_ready,
         )
+        if dropped:
+            click.echo(f"abreast {name}: {dropped} messages came too fast and were dropped", err=True)
 
     path = click.Path(path_type=Path, dir_okay=False)
     positive = click.FloatRange(min=0, min_open=True)

@@ -118,11 +118,12 @@ def run_daemon(
     ending: Ending,
     duration_s: float | None = None,
     on_ready: Callable[[], None] = lambda: None,
-) -> None:
+) -> int:
     """Run a worker on the wire until the end is asked for or ``duration_s`` is over.
 
     The worker is made once the wire is there; ``on_ready`` is called when it is subscribed. Events are taken
-    one at a time in order of arrival; ``now`` is the host clock when one is taken.
+    one at a time in order of arrival; ``now`` is the host clock when one is taken. Returns how many arrivals
+    found the inbox full and were dropped.
     """
     session = open_session(endpoints, give_up=lambda: ending.asked)
     wire = Wire(session, urgent=(names.cmd_vel, topics.STOP))
@@ -141,6 +142,7 @@ def run_daemon(
                 _publish(wire, worker.take(event or TICK, now_ns))
         _publish(wire, worker.end(time.time_ns()))
         time.sleep(_LINGER)
+        return wire.inbox.dropped
     finally:
         wire.close()
         close_session(session)

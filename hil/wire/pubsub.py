@@ -5,7 +5,7 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import zenoh
 
@@ -20,7 +20,7 @@ INBOX_LIMIT = 100_000
 class Inbox:
     """Payloads in order of arrival. ``dropped``: how many found it full."""
 
-    waiting: queue.SimpleQueue[Event]
+    waiting: queue.SimpleQueue[Event] = field(default_factory=queue.SimpleQueue)
     dropped: int = 0
 
     def put(self, event: Event) -> None:
@@ -42,7 +42,7 @@ class Wire:
     """Subscriptions into one inbox, and publishers that are declared when first used."""
 
     def __init__(self, session: zenoh.Session, urgent: Iterable[str] = ()) -> None:
-        self.inbox = Inbox(queue.SimpleQueue())
+        self.inbox = Inbox()
         self._session = session
         self._urgent = frozenset(urgent)
         self._publishers: dict[str, zenoh.Publisher] = {}

@@ -60,15 +60,8 @@ def test_a_mistake_gives_exit_code_2_and_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_nobody_at_the_endpoint_is_said_in_one_line(tmp_path: Path) -> None:
-    result = abreast("controller", "turtlebot3", "--connect", "tcp/127.0.0.1:1", folder=tmp_path)
-    assert result.returncode == 1
-    assert "tcp/127.0.0.1:1" in result.stderr.strip().splitlines()[-1]
-    assert "Traceback" not in result.stderr
-
-
 def test_a_lockstep_run_prints_one_json_object_and_leaves_its_files(tmp_path: Path) -> None:
-    arguments = ["run", "--lockstep", "--duration", "6", "--seed", "7", "--json"]
+    arguments = ["run", "--lockstep", "--duration", "3", "--seed", "7", "--json"]
     first = abreast(*arguments, "--out", "a", folder=tmp_path)
     again = abreast(*arguments, "--out", "b", folder=tmp_path)
     assert first.returncode == again.returncode == 0, first.stderr

@@ -220,7 +220,7 @@ def test_a_killed_recorder_loses_at_most_half_a_second(start: Callable[..., Run]
 
 def test_nonsense_on_the_wire_is_counted_and_moves_nobody(start: Callable[..., Run]) -> None:
     many = 10_000
-    run = start(duration=14.0)
+    run = start(duration=9.0)
     run.wait_until(driving(run))
     session = open_session(Endpoints(connect=run.endpoint))
     wire = Wire(session)

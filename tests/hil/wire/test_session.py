@@ -1,0 +1,68 @@
+"""Sessions: who answers, who does not, and what is written wrongly."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from hil.errors import AbreastError, UsageError
+from hil.nodes.node import Event
+from hil.wire.pubsub import INBOX_LIMIT, Inbox, Wire
+from hil.wire.session import Endpoints, close_session, free_endpoint, open_session
+
+
+def test_what_one_client_publishes_another_receives_in_order() -> None:
+    endpoint = free_endpoint()
+    sessions = [open_session(Endpoints(listen=endpoint))]
+    sessions += [open_session(Endpoints(connect=endpoint)) for _ in range(2)]
+    sender, receiver = Wire(sessions[1], urgent=("a",)), Wire(sessions[2])
+    try:
+        receiver.subscribe(("a", "b/c"))
+        sent = [Event("b/c", bytes([number])) for number in range(100)]
+        deadline = time.monotonic() + 5.0
+        while receiver.inbox.take(0.05) is None and time.monotonic() < deadline:
+            sender.publish("a", b"are you there")
+        while receiver.inbox.take(0.2) is not None:
+            pass
+        for event in sent:
+            sender.publish(event.topic, event.payload)
+        assert [receiver.inbox.take(2.0) for _ in sent] == sent
+        assert receiver.inbox.take(0.0) is None
+    finally:
+        for wire in (sender, receiver):
+            wire.close()
+        for session in reversed(sessions):
+            close_session(session)
+
+
+def test_nobody_at_the_endpoint_is_said_with_its_name() -> None:
+    with pytest.raises(AbreastError, match=r"tcp/127\.0\.0\.1:1: no session .* is the router up"):
+        open_session(Endpoints(connect="tcp/127.0.0.1:1"), patience=0.3)
+
+
+def test_an_end_that_is_asked_for_is_not_waited_out() -> None:
+    begun = time.monotonic()
+    with pytest.raises(AbreastError):
+        open_session(Endpoints(connect="tcp/127.0.0.1:1"), patience=30.0, give_up=lambda: True)
+    assert time.monotonic() - begun < 10.0
+
+
+@pytest.mark.parametrize("endpoint", ["nonsense", "tcp:127.0.0.1:7447", "tcp/", "", "TCP/127.0.0.1:1"])
+def test_a_mistyped_endpoint_is_refused_with_an_example(endpoint: str) -> None:
+    with pytest.raises(UsageError, match="such as tcp/127"):
+        Endpoints(connect=endpoint)
+
+
+def test_a_config_file_that_is_not_there_is_named() -> None:
+    with pytest.raises(UsageError, match="no_such_config"):
+        open_session(Endpoints(config_file=Path("no_such_config.json5")))
+
+
+def test_an_inbox_that_is_full_drops_and_counts() -> None:
+    inbox = Inbox()
+    for _ in range(INBOX_LIMIT + 3):
+        inbox.put(Event("a"))
+    assert inbox.dropped == 3
+    assert inbox.take(0.0) == Event("a")
