@@ -10,6 +10,8 @@ from estimation.belief import Belief, Model, Rates
 from estimation.measurement import FrontEnd, Measurement
 from estimation.motion import FollowerMotion, Matrix, Vector
 from formation.angles import wrap
+from formation.pose import Motion
+from formation.shape import leader_velocity, polar_velocity
 
 
 class DifferenceEstimator:
@@ -47,15 +49,13 @@ class DifferenceEstimator:
         gain = max(dt / (self.cutoff + dt), 1.0 / (last.samples + 1))
         rho_dot = last.rho_dot + gain * ((rho - last.rho) / dt - last.rho_dot)
         alpha2_dot = last.alpha2_dot + gain * (float(wrap(alpha2 - last.alpha2)) / dt - last.alpha2_dot)
-        v2, u2 = measurement.motion.v2, measurement.motion.u2
-        X = -rho_dot - v2 * math.cos(alpha2)
-        Y = rho * (alpha2_dot + u2) - v2 * math.sin(alpha2)
-        v1, alpha1 = math.hypot(X, Y), math.atan2(Y, X)
+        own = Motion(measurement.motion.v2, measurement.motion.u2)
+        v1, alpha1 = polar_velocity(*leader_velocity(rho, alpha2, rho_dot, alpha2_dot, own))
         sight = alpha2 + (measurement.pose.theta if measurement.pose is not None else 0.0)
         heading = sight + math.pi - alpha1
         turn = float(wrap(heading - last.heading)) / dt
         if self.model.front_end is FrontEnd.BODY:
-            turn += u2
+            turn += own.u
         u1 = float(belief.mean[4]) + gain * (turn - float(belief.mean[4])) if last.samples else 0.0
         mean = np.array([*measurement.position, v1 * math.cos(heading), v1 * math.sin(heading), u1])
         rates = Rates(rho, alpha2, rho_dot, alpha2_dot, heading, last.samples + 1)

@@ -59,10 +59,6 @@ class Children:
         readable, _, _ = select.select([child.watch for child in self._children.values()], [], [], timeout)
         return next((child for child in self._children.values() if child.watch in readable), None)
 
-    def pid_of(self, name: str) -> int:
-        """Process id of a daemon."""
-        return self._children[name].process.pid
-
     def end(self, names: list[str]) -> None:
         """Tell daemons to end, together, and wait; one that doesn't is killed."""
         chosen = [self._children[name] for name in names if name in self._children]
