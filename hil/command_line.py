@@ -66,7 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except click.ClickException as error:
         _say(f"abreast: {error.format_message()}")
         code = 2
-    except click.Abort:
+    except (click.Abort, KeyboardInterrupt):
+        _say("abreast: interrupted")
         code = 1
     except AbreastError as error:
         _say(f"abreast: {error}")

@@ -55,6 +55,8 @@ def command(
     if log_path.exists():
         raise UsageError(f"{log_path} exists already; give another --out, or move it away")
     failure = _lockstep(chosen, log_path) if lockstep else _live(chosen, folder, log_path, listen)
+    if not log_path.exists():
+        raise CheckFailedError(failure or "interrupted before anything was recorded")
     if failure:
         _make_whole(log_path)
     summary = _judge(log_path, folder)

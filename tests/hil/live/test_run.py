@@ -190,7 +190,9 @@ def test_an_interrupt_while_starting_leaves_no_process(start: Callable[..., Run]
     run = start(duration=30.0)
     run.wait_until(lambda: len(run.daemons()) == 4)
     run.process.send_signal(signal.SIGINT)
-    run.finish()
+    _, _, err = run.finish()
+    assert "interrupted" in err
+    assert "Traceback" not in err
     assert run.daemons() == {}
 
 
