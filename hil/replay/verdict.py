@@ -83,8 +83,9 @@ def why_not_same(log: Log, played: Replay) -> str:
     ]
     if not wrong:
         return ""
-    lost = f"; {played.missing_inputs} inputs are missing in the log" if played.missing_inputs else ""
-    return f"log {log.path}: {', '.join(wrong)}{lost}"
+    lost = f"{played.missing_inputs} inputs are missing in the log" if played.missing_inputs else ""
+    doubt = "did every daemon run with the recorder's scenario, and with this version of abreast?"
+    return f"log {log.path}: {', '.join(wrong)}; {lost or doubt}"
 
 
 def violated_bounds(summary: Mapping[str, Any]) -> dict[str, int]:
