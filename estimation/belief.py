@@ -25,16 +25,26 @@ class Rates:
 
 
 @dataclass(frozen=True, slots=True)
+class Modes:
+    """Memory of an estimator of several models: the belief of each, and the probability that it holds."""
+
+    beliefs: tuple[Belief, ...]
+    probabilities: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Belief:
     """Mean (5,) and covariance (5, 5) of the state of :mod:`estimation.motion`.
 
-    ``rates`` and ``elapsed`` (time since the last update [s]) are kept by estimators that difference.
+    ``rates`` and ``elapsed`` (time since the last update [s]) are kept by estimators that difference,
+    ``memory`` by those that know more than mean and covariance say.
     """
 
     mean: Vector
     covariance: Matrix
     rates: Rates | None = None
     elapsed: float = 0.0
+    memory: Modes | None = None
 
     @property
     def speed(self) -> float:

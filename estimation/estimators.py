@@ -6,12 +6,14 @@ from collections.abc import Callable
 
 from estimation.belief import Model
 from estimation.difference import DifferenceEstimator
+from estimation.imm import InteractingModels
 from estimation.kalman import ExtendedFilter, UnscentedFilter
 from estimation.tracking import Estimator
 
 ESTIMATORS: dict[str, Callable[[Model, float], Estimator]] = {
     "ekf": lambda model, cutoff: ExtendedFilter(model),
     "ukf": lambda model, cutoff: UnscentedFilter(model),
+    "imm": lambda model, cutoff: InteractingModels(model),
     "difference": DifferenceEstimator,
 }
 

@@ -21,7 +21,7 @@ DURATION = click.FloatRange(min=0, min_open=True)
 @click.argument("scenario", default="turtlebot3")
 @click.option("--duration", type=DURATION, metavar="S", help="Seconds from the leader's start to the stop.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all noise.")
-@click.option("--estimator", metavar="E", help="Estimator: ekf, ukf or difference.")
+@click.option("--estimator", metavar="E", help="Estimator: ekf, ukf, imm or difference.")
 @click.option("--law", metavar="L", help="Law of the follower.")
 @click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Folder for results."

@@ -18,7 +18,7 @@ Name = Annotated[str, Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 PoseTriple = tuple[float, float, float]
 
 LawName = Literal["independent", "ideal"]
-EstimatorName = Literal["ekf", "ukf", "difference"]
+EstimatorName = Literal["ekf", "ukf", "imm", "difference"]
 FrontEnd = Literal["world", "body"]
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 
 import numpy as np
 import pytest
 
-from estimation.belief import Belief, Model
+from estimation.belief import Model
 from estimation.estimate import Estimate, estimate_of
 from estimation.estimators import ESTIMATORS, make_estimator
 from estimation.measurement import (
@@ -102,12 +102,15 @@ def newest(of: Tracker, track: Track) -> Estimate:
     return estimate_of(point.belief, point.measurement, status_now(of, track), point.nis, point.used_ns)
 
 
-def same(left: Belief, right: Belief) -> bool:
-    return (
-        np.array_equal(left.mean, right.mean)
-        and np.array_equal(left.covariance, right.covariance)
-        and (left.rates, left.elapsed) == (right.rates, right.elapsed)
-    )
+def same(left: object, right: object) -> bool:
+    """Equal to the last bit, all that is remembered included."""
+    if isinstance(left, np.ndarray) and isinstance(right, np.ndarray):
+        return np.array_equal(left, right)
+    if isinstance(left, tuple) and isinstance(right, tuple):
+        return len(left) == len(right) and all(map(same, left, right))
+    if is_dataclass(left) and type(left) is type(right):
+        return all(same(getattr(left, each.name), getattr(right, each.name)) for each in fields(left))
+    return left == right
 
 
 def moved(measurement: Measurement, dx: float, dy: float) -> Measurement:
