@@ -31,3 +31,22 @@ def import_table(recording: Path, chart: str, out: Path) -> None:
         f"go on with: abreast replay {out}",
         err=True,
     )
+
+
+@command.command("mrclam")
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--leader", required=True, type=int, metavar="N", help="Number of the robot that leads.")
+@click.option("--follower", required=True, type=int, metavar="N", help="Number of the robot that follows.")
+@click.option(
+    "--out", required=True, type=click.Path(path_type=Path), metavar="LOG", help="The log to write."
+)
+def import_mrclam_pair(folder: Path, leader: int, follower: int, out: Path) -> None:
+    """Turn two robots of the UTIAS multi-robot data set in FOLDER into a log."""
+    from hil.recordings.mrclam_import import import_mrclam
+
+    done = import_mrclam(folder, leader, follower, out)
+    click.echo(
+        f"{out}: {done.rows} frames from {done.from_s:.3f} s to {done.to_s:.3f} s; "
+        f"go on with: abreast replay {out}",
+        err=True,
+    )
