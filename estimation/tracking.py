@@ -122,7 +122,7 @@ class Tracker:
         that at its own place.
         """
         if not track:
-            return (self._begin(measurement, Verdict.RESTARTED),), Verdict.RESTARTED
+            return (self.begin(measurement),), Verdict.RESTARTED
         if measurement.capture_ns > track[-1].measurement.capture_ns:
             point = self.follow(track[-1], measurement)
             return self._trim((*track, point)), point.verdict
@@ -137,24 +137,33 @@ class Tracker:
             points.append(self.follow(points[-1], due))
         return tuple(points), points[place].verdict
 
+    def begin(self, measurement: Measurement) -> TrackPoint:
+        """First point of a track that knows nothing but this measurement."""
+        belief = self.estimator.start(measurement)
+        return TrackPoint(
+            measurement, belief, Verdict.RESTARTED, math.nan, measurement.capture_ns, settled=False
+        )
+
     def follow(self, last: TrackPoint, measurement: Measurement) -> TrackPoint:
         """Fold one measurement, newer than the point, into it."""
         dt = (measurement.capture_ns - last.measurement.capture_ns) * _NS
         if (measurement.capture_ns - last.used_ns) * _NS > self.settings.lost_after:
-            return self._begin(measurement, Verdict.RESTARTED)
-        prior = self.estimator.predict(last.belief, dt, _mean(last.measurement.motion, measurement.motion))
+            return self.begin(measurement)
+        prior = self.estimator.predict(
+            last.belief, dt, mean_motion(last.measurement.motion, measurement.motion)
+        )
         nis = innovation(prior, measurement).nis
         if nis <= self._gate:
             belief = self.estimator.update(prior, measurement)
-            settled = self._settled(belief, last.settled)
+            settled = self.settled(belief, last.settled)
             return TrackPoint(measurement, belief, Verdict.USED, nis, measurement.capture_ns, settled)
         candidate = self._nurse(last.candidate, measurement)
         if candidate.frames >= self.settings.reacquire_frames:
-            settled = self._settled(candidate.belief, before=False)
+            settled = self.settled(candidate.belief, before=False)
             return TrackPoint(
                 measurement, candidate.belief, Verdict.RESTARTED, nis, measurement.capture_ns, settled
             )
-        settled = self._settled(prior, last.settled)
+        settled = self.settled(prior, last.settled)
         return TrackPoint(measurement, prior, Verdict.GATED, nis, last.used_ns, settled, candidate)
 
     def status(self, track: Track, now_ns: int) -> Status:
@@ -171,22 +180,19 @@ class Tracker:
             return Status.COASTING
         return Status.TRACKING if newest.settled else Status.INITIALISING
 
-    def _begin(self, measurement: Measurement, verdict: Verdict) -> TrackPoint:
-        belief = self.estimator.start(measurement)
-        return TrackPoint(measurement, belief, verdict, math.nan, measurement.capture_ns, settled=False)
-
     def _nurse(self, candidate: Candidate | None, measurement: Measurement) -> Candidate:
         """Let a rejected measurement join the candidate, or start a new one if they do not agree."""
         if candidate is not None:
             dt = (measurement.capture_ns - candidate.capture_ns) * _NS
-            follower = _mean(candidate.motion, measurement.motion)
+            follower = mean_motion(candidate.motion, measurement.motion)
             prior = self.estimator.predict(candidate.belief, dt, follower)
             if innovation(prior, measurement).nis <= self._gate:
                 belief = self.estimator.update(prior, measurement)
                 return Candidate(belief, measurement.capture_ns, measurement.motion, candidate.frames + 1)
         return Candidate(self.estimator.start(measurement), measurement.capture_ns, measurement.motion, 1)
 
-    def _settled(self, belief: Belief, before: bool) -> bool:
+    def settled(self, belief: Belief, before: bool) -> bool:
+        """Whether the leader's direction is known well enough, for a track that was settled before or not."""
         settings, limits = self.settings, self.estimator.model.limits
         if belief.speed < 0.5 * limits.v_eps:
             return False
@@ -202,6 +208,6 @@ class Tracker:
         return track[first - 1 :] if first > 1 else track
 
 
-def _mean(a: FollowerMotion, b: FollowerMotion) -> FollowerMotion:
+def mean_motion(a: FollowerMotion, b: FollowerMotion) -> FollowerMotion:
     """Mean motion over an interval, from the motions at its ends (trapezoid)."""
     return replace(b, v2=0.5 * (a.v2 + b.v2), u2=0.5 * (a.u2 + b.u2))

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @click.command("replay")
 @click.argument("log", type=click.Path(path_type=Path))
 @click.option("--verify", is_flag=True, help="Compare with what was recorded, bit for bit.")
-@click.option("--estimator", metavar="E", help="Estimator in place of the log's: ekf, ukf, imm or difference.")
+@click.option("--estimator", metavar="E", help="Estimator in place of the log's, such as ukf or smoother.")
 @click.option("--leader", metavar="NAME", help="Name of the leader's body.")
 @click.option("--follower", metavar="NAME", help="Name of the follower's body.")
 @click.option("--map", "chart", metavar="FILE", help="Names the topics of a log that is not abreast's.")

@@ -11,7 +11,7 @@ import click
 
 from hil.errors import CheckFailedError, UsageError
 from hil.report_json import print_json, write_json
-from hil.scenario.files import load_scenario
+from hil.scenario.files import load_scenario, refuse_offline
 from hil.scenario.schema import Scenario
 
 DURATION = click.FloatRange(min=0, min_open=True)
@@ -21,7 +21,7 @@ DURATION = click.FloatRange(min=0, min_open=True)
 @click.argument("scenario", default="turtlebot3")
 @click.option("--duration", type=DURATION, metavar="S", help="Seconds from the leader's start to the stop.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all noise.")
-@click.option("--estimator", metavar="E", help="Estimator: ekf, ukf, imm or difference.")
+@click.option("--estimator", metavar="E", help="Estimator, such as ekf, ukf or imm.")
 @click.option("--law", metavar="L", help="Law of the follower.")
 @click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Folder for results."
@@ -50,6 +50,7 @@ def command(
     given = {"run.duration_s": duration, "run.seed": seed, "estimator.kind": estimator, "controller.law": law}
     options = [f"{key}={value}" for key, value in given.items() if value is not None]
     chosen = load_scenario(scenario, [*overrides, *options])
+    refuse_offline(chosen)
     folder = _folder(chosen, out)
     log_path = folder / "run.mcap"
     if log_path.exists():

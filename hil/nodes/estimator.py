@@ -33,6 +33,7 @@ from hil.nodes.node import (
     no_counts,
     outgoing,
 )
+from hil.scenario.files import refuse_offline
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.estimate_message import AssumedErrors, to_message
@@ -73,11 +74,12 @@ class EstimatorState(Struct, frozen=True):
 
 
 class EstimatorNode:
-    """Pure step of the estimator daemon."""
+    """Pure step of the estimator daemon. Raises :class:`UsageError` for an estimator that is not live."""
 
     name = NAME
 
     def __init__(self, scenario: Scenario) -> None:
+        refuse_offline(scenario)
         given, leader = scenario.estimator, scenario.leader
         self.scenario = scenario
         self.topics = topics_of(scenario)

@@ -15,6 +15,7 @@ from hil.nodes.estimator import EstimatorNode, EstimatorState
 from hil.nodes.node import Outgoing, digest
 from hil.replay.foreign_log import foreign_events
 from hil.replay.journal import Journey, Parity, feed, index_by_digest, parity_of, refeed
+from hil.replay.smoothing import ListeningEstimator, smoothed_estimates
 from hil.replay.topic_map import TopicMap
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
@@ -63,15 +64,15 @@ def replay(log: Log, scenario: Scenario | None = None) -> Replay:
     chosen = own if scenario is None else scenario
     if chosen != own:
         check_inputs(log, chosen)
-    node = EstimatorNode(chosen)
+    node = _estimator_of(chosen)
     recorded = recorded_estimates(log, node.topics.estimate)
     if not recorded:
         check_inputs(log, chosen)
-        return _estimated_anew(chosen, feed(node, logged_events(log, node.subscribes)))
+        return _estimated_anew(chosen, node, feed(node, logged_events(log, node.subscribes)))
     index = index_by_digest(logged_events(log, node.subscribes))
     journey = refeed(node, node.topics.estimate, recorded, index)
     if chosen != own:
-        return _estimated_anew(chosen, journey)
+        return _estimated_anew(chosen, node, journey)
     estimates = parity_of(journey.repeated, node.topics.estimate, {})
     return _with_commands(log, own, journey, estimates)
 
@@ -81,12 +82,19 @@ def replay_foreign(log: Log, chart: TopicMap) -> Replay:
 
     Raises :class:`UsageError` as :func:`hil.replay.foreign_log.foreign_events`.
     """
-    node = EstimatorNode(chart.scenario)
-    return _estimated_anew(chart.scenario, feed(node, foreign_events(log, chart)))
+    node = _estimator_of(chart.scenario)
+    return _estimated_anew(chart.scenario, node, feed(node, foreign_events(log, chart)))
 
 
-def _estimated_anew(scenario: Scenario, journey: Journey[EstimatorState]) -> Replay:
-    estimates = _decoded(journey.outputs, msg.LeaderEstimate)
+def _estimator_of(scenario: Scenario) -> EstimatorNode:
+    return ListeningEstimator(scenario) if scenario.estimator.kind == "smoother" else EstimatorNode(scenario)
+
+
+def _estimated_anew(scenario: Scenario, node: EstimatorNode, journey: Journey[EstimatorState]) -> Replay:
+    if isinstance(node, ListeningEstimator):
+        estimates = tuple(smoothed_estimates(node))
+    else:
+        estimates = _decoded(journey.outputs, msg.LeaderEstimate)
     return Replay(scenario, estimates, (), journey.state, missing_inputs=journey.missing)
 
 

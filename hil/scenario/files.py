@@ -11,7 +11,7 @@ import tomli_w
 
 from hil.errors import UsageError
 from hil.scenario.checked_toml import checked, locate, read_toml, shipped_names
-from hil.scenario.schema import Scenario
+from hil.scenario.schema import OFFLINE_ESTIMATORS, Scenario
 
 _FOLDER = "scenarios"
 _DEFAULT_BASE = "turtlebot3"
@@ -42,6 +42,16 @@ def build_scenario(
     for override in overrides:
         _apply(merged, override)
     return checked(merged, Scenario, source)
+
+
+def refuse_offline(scenario: Scenario) -> None:
+    """Raise :class:`UsageError` if the scenario asks for an estimator that needs to know the future."""
+    kind = scenario.estimator.kind
+    if kind in OFFLINE_ESTIMATORS:
+        raise UsageError(
+            f"estimator.kind is {kind!r}: it needs a whole log; run with another one, then "
+            f"abreast replay LOG --estimator {kind}"
+        )
 
 
 def merged_scenario(part: Mapping[str, Any], name: str, source: str) -> Scenario:

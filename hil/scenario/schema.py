@@ -6,7 +6,7 @@ an unknown key, a wrong type or a value out of range is a :class:`~hil.errors.Us
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from msgspec import Meta, Struct
 
@@ -19,6 +19,8 @@ PoseTriple = tuple[float, float, float]
 
 LawName = Literal["independent", "ideal"]
 EstimatorName = Literal["ekf", "ukf", "imm", "difference"]
+OfflineName = Literal["smoother"]
+OFFLINE_ESTIMATORS: tuple[OfflineName, ...] = get_args(OfflineName)
 FrontEnd = Literal["world", "body"]
 
 
@@ -147,9 +149,10 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``input_lag_s`` in acting (set it where commands stand in for odometry).
     ``sigma_range``, ``sigma_bearing``: of a body-frame sensor; for mocap they follow from the geometry.
     ``turn_bandwidth``: q_u = turn_bandwidth * k_u^2 per second (0.5 agile, 0.03 gentle leaders).
+    ``kind`` smoother is for replays only.
     """
 
-    kind: EstimatorName = "ekf"
+    kind: EstimatorName | OfflineName = "ekf"
     front_end: FrontEnd = "world"
     sigma_position: Positive = 0.0003
     sigma_heading: Positive = 0.0035
