@@ -8,12 +8,14 @@ from estimation.belief import Model
 from estimation.difference import DifferenceEstimator
 from estimation.imm import InteractingModels
 from estimation.kalman import ExtendedFilter, UnscentedFilter
+from estimation.shape_filter import ShapeFilter
 from estimation.tracking import Estimator
 
 ESTIMATORS: dict[str, Callable[[Model, float], Estimator]] = {
     "ekf": lambda model, cutoff: ExtendedFilter(model),
     "ukf": lambda model, cutoff: UnscentedFilter(model),
-    "imm": lambda model, cutoff: InteractingModels(model),
+    "imm": lambda model, cutoff: InteractingModels(model, ExtendedFilter),
+    "shape-ekf": lambda model, cutoff: ShapeFilter(model),
     "difference": DifferenceEstimator,
 }
 

@@ -14,7 +14,6 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.belief import Belief, Model, Modes, innovation
-from estimation.kalman import ExtendedFilter
 from estimation.measurement import Measurement
 from estimation.motion import FollowerMotion, Matrix
 from estimation.tracking import Estimator
@@ -28,16 +27,16 @@ _LEAST_PROBABILITY = 1e-6  # a mode never dies out, so that it can come back
 class InteractingModels:
     """One filter for each turn-rate bandwidth; the belief is their mixture, matched in its two moments.
 
-    ``sojourn`` [s]: mean time that a leader stays in a mode. ``make_filter`` builds the filter of a mode.
+    ``make_filter`` builds the filter of a mode. ``sojourn`` [s]: mean time that a leader stays in a mode.
     The filters' beliefs and the probabilities of the modes travel as :class:`Modes` in the belief.
     """
 
     def __init__(
         self,
         model: Model,
+        make_filter: Callable[[Model], Estimator],
         bandwidths: Sequence[float] = TURN_BANDWIDTHS,
         sojourn: float = 2.0,
-        make_filter: Callable[[Model], Estimator] = ExtendedFilter,
     ) -> None:
         self.model = model
         self.sojourn = sojourn

@@ -91,7 +91,7 @@ def score(of: Estimator, bandwidth: float, runs: int = 6, steps: int = 480, late
 def test_whatever_the_leader_it_comes_close_to_the_filter_made_for_it(bandwidth: float, other: float) -> None:
     made_for_it = score(ExtendedFilter(model(bandwidth)), bandwidth)
     not_made_for_it = score(ExtendedFilter(model(other)), bandwidth)
-    found = score(InteractingModels(model(AGILE)), bandwidth)
+    found = score(InteractingModels(model(AGILE), ExtendedFilter), bandwidth)
     assert found.w < 1.02**2 * made_for_it.w
     assert found.u < not_made_for_it.u
     assert found.nis == pytest.approx(2.0, abs=0.15)
@@ -101,7 +101,7 @@ def test_whatever_the_leader_it_comes_close_to_the_filter_made_for_it(bandwidth:
 def test_one_mode_alone_is_the_plain_filter() -> None:
     generator = np.random.default_rng(2)
     seen = measured(generator, random_leader(generator, 60, AGILE))
-    alone, plain = InteractingModels(model(GENTLE), [AGILE]), ExtendedFilter(model(AGILE))
+    alone, plain = InteractingModels(model(GENTLE), ExtendedFilter, [AGILE]), ExtendedFilter(model(AGILE))
     left, right = alone.start(seen[0]), plain.start(seen[0])
     for measurement in seen[1:]:
         left = alone.update(alone.predict(left, DT, STANDING), measurement)
@@ -129,7 +129,7 @@ def test_a_mixture_has_the_moments_of_samples_drawn_from_it() -> None:
 def test_coasting_forgets_the_mode() -> None:
     generator = np.random.default_rng(4)
     seen = measured(generator, random_leader(generator, 200, AGILE))
-    of = InteractingModels(model(AGILE))
+    of = InteractingModels(model(AGILE), ExtendedFilter)
     belief = of.start(seen[0])
     for measurement in seen[1:]:
         belief = of.update(of.predict(belief, DT, STANDING), measurement)
@@ -148,7 +148,7 @@ def probabilities(belief: Belief) -> tuple[float, ...]:
 
 
 def test_a_belief_of_another_estimator_is_refused() -> None:
-    of = InteractingModels(model(AGILE))
+    of = InteractingModels(model(AGILE), ExtendedFilter)
     plain = ExtendedFilter(of.model).start(measured(np.random.default_rng(1), np.zeros((1, 5)))[0])
     with pytest.raises(TypeError, match="expected Modes"):
         of.predict(plain, DT, STANDING)

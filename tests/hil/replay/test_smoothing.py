@@ -80,7 +80,7 @@ def asked(command: Command, *arguments: object) -> None:
 
 
 def test_it_cannot_run_live_and_says_where_it_can(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="needs a whole log.* abreast replay LOG --estimator smoother"):
+    with pytest.raises(UsageError, match=r"needs a whole log.* abreast replay LOG --estimator smoother"):
         asked(run.command, "turtlebot3", "--estimator", "smoother", "--out", tmp_path / "run")
     assert not (tmp_path / "run").exists()
     with pytest.raises(UsageError, match="needs a whole log"):

@@ -1,0 +1,38 @@
+"""What some estimators know beyond mean and covariance: plain data that travels in the belief."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from estimation.motion import Matrix, Vector
+from formation.pose import Pose
+
+
+@dataclass(frozen=True, slots=True)
+class Guess:
+    """What a first guess of the leader's velocity is made of: an earlier position, and how it has aged.
+
+    anchor: (2,) [m], in the frame of the front end; covariance: (2, 2) [m^2]. elapsed [s] since it was
+    measured. drift [m]: how far the follower's own motion may have carried it wrongly. samples: since then.
+    """
+
+    anchor: Vector
+    covariance: Matrix
+    elapsed: float = 0.0
+    drift: float = 0.0
+    samples: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class ShapeState:
+    """State (5,) ``[rho, alpha1, alpha2, v1, u1]`` with its covariance (5, 5), SI units and radians.
+
+    pose: where the follower is believed to be, for the world front end; heading_noise [rad] and
+    position_noise [m] are those of the pose.
+    """
+
+    state: Vector
+    covariance: Matrix
+    pose: Pose | None = None
+    position_noise: float = 0.0
+    heading_noise: float = 0.0
