@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace as with_changes
 
 from msgspec import Struct, field
 from msgspec.structs import replace
@@ -20,8 +21,17 @@ from estimation.measurement import (
     measure_body_from_mocap,
     measure_world,
 )
-from estimation.motion import LeaderLimits, ProcessNoise
+from estimation.motion import FollowerMotion, LeaderLimits, ProcessNoise
+from estimation.own_motion import (
+    ODOMETRY_CORRELATION,
+    TRACK_CORRELATION,
+    OwnNoise,
+    OwnTrack,
+    fold,
+    own_motion,
+)
 from estimation.tracking import Status, Track, Tracker, TrackSettings, Verdict
+from formation.pose import Pose
 from hil.nodes.node import (
     Counts,
     Event,
@@ -59,12 +69,14 @@ REASONS = {
 class EstimatorState(Struct, frozen=True):
     """All that the estimator remembers.
 
-    ``receipts``: inputs since the last estimate. ``refused``: inputs that were not used, by cause.
-    ``taken``: inputs that were used, by kind. ``last_status``: of the last estimate that went out.
+    ``own``: the follower's own mocap track, empty where odometry alone tells of its motion. ``receipts``:
+    inputs since the last estimate. ``refused``: inputs that were not used, by cause. ``taken``: inputs that
+    were used, by kind. ``last_status``: of the last estimate that went out.
     """
 
     track: Track = ()
     history: History = ()
+    own: OwnTrack = ()
     receipts: tuple[Consumed, ...] = ()
     refused: Counts = field(default_factory=no_counts)
     taken: Counts = field(default_factory=no_counts)
@@ -85,7 +97,9 @@ class EstimatorNode:
         self.topics = topics_of(scenario)
         self.front_end = FrontEnd(given.front_end)
         limits = LeaderLimits(leader.v_eps, leader.k_v, leader.k_u)
-        model = Model(self.front_end, limits, ProcessNoise.by_rule(limits, given.turn_bandwidth))
+        correlation = ODOMETRY_CORRELATION if given.own_motion == "odometry" else TRACK_CORRELATION
+        noise = ProcessNoise.by_rule(limits, given.turn_bandwidth)
+        model = Model(self.front_end, limits, noise, input_correlation=correlation)
         settled, unsettled = settling(given.kind)
         settings = TrackSettings(
             gate_probability=given.gate_probability,
@@ -99,6 +113,7 @@ class EstimatorNode:
         self.tracker = Tracker(make_estimator(given.kind, model, given.difference_cutoff_s), settings)
         self.trust = InputTrust(given.sigma_v2, given.sigma_u2, given.input_delay_s, given.input_lag_s)
         self.pose_noise = PoseNoise(given.sigma_position, given.sigma_heading)
+        self.own_noise = OwnNoise(self.pose_noise, scenario.controller.v_max, scenario.controller.u_max)
         self.assumed = AssumedErrors.of(scenario)
         self._handlers: dict[str, Callable[[EstimatorState, bytes, int], EstimatorState]] = {
             topics.RIGID_BODIES: self._on_frame,
@@ -150,9 +165,21 @@ class EstimatorNode:
         leader, follower = frame.leader, frame.follower
         if math.dist(leader, (follower.x, follower.y)) < _SAME_PLACE:
             raise RefusedError("same_place")
-        motion = follower_motion(state.history, frame.capture_ns, self.trust)
+        own, motion = self._own_motion(state, frame.capture_ns, follower)
         measure = measure_world if self.front_end is FrontEnd.WORLD else measure_body_from_mocap
-        return self._add(state, measure(frame.capture_ns, leader, follower, self.pose_noise, motion))
+        return self._add(state, measure(frame.capture_ns, leader, follower, self.pose_noise, motion), own)
+
+    def _own_motion(
+        self, state: EstimatorState, capture_ns: int, pose: Pose
+    ) -> tuple[OwnTrack, FollowerMotion]:
+        """Own track with a pose in it, if one is kept, and the follower's motion at its capture time."""
+        source = self.scenario.estimator.own_motion
+        by_odometry = follower_motion(state.history, capture_ns, self.trust)
+        if source == "odometry":
+            return (), by_odometry
+        fused = by_odometry if source == "fused" and state.history else None
+        own = fold(state.own, capture_ns, pose, fused, self.own_noise, self.tracker.settings.window)
+        return own, own_motion(own, capture_ns) or by_odometry
 
     def _on_sighting(self, state: EstimatorState, payload: bytes, now_ns: int) -> EstimatorState:
         if self.front_end is FrontEnd.WORLD:
@@ -171,9 +198,12 @@ class EstimatorNode:
         history = remember(state.history, sample, _HISTORY)
         return replace(state, history=history, taken=counted(state.taken, "odometry"))
 
-    def _add(self, state: EstimatorState, measurement: Measurement) -> EstimatorState:
+    def _add(self, state: EstimatorState, measurement: Measurement, own: OwnTrack = ()) -> EstimatorState:
         late = bool(state.track) and measurement.capture_ns < state.track[-1].measurement.capture_ns
         track, verdict = self.tracker.add(state.track, measurement)
+        if own and verdict not in (Verdict.DUPLICATE, Verdict.LATE):
+            track = self._retold(state.track, measurement, own) if late else track
+            state = replace(state, own=own)
         if verdict in (Verdict.DUPLICATE, Verdict.LATE, Verdict.GATED):
             state = replace(state, refused=counted(state.refused, verdict.value))
         else:
@@ -181,6 +211,16 @@ class EstimatorNode:
         if late and verdict is not Verdict.DUPLICATE:
             state = replace(state, taken=counted(state.taken, "late"))
         return replace(state, track=track)
+
+    def _retold(self, track: Track, measurement: Measurement, own: OwnTrack) -> Track:
+        """Track with a late measurement at its place, and what follows it with the motion known since."""
+        place = sum(point.measurement.capture_ns < measurement.capture_ns for point in track)
+        later = [point.measurement for point in track[place:]]
+        track = track[:place]
+        for due in (measurement, *later):
+            motion = own_motion(own, due.capture_ns) or due.motion
+            track, _ = self.tracker.add(track, with_changes(due, motion=motion))
+        return track
 
     def _publish(self, state: EstimatorState, now_ns: int) -> tuple[EstimatorState, tuple[Outgoing, ...]]:
         estimate = self.estimate(state, now_ns)
@@ -204,7 +244,8 @@ class EstimatorNode:
 
     def report(self, state: EstimatorState, now_ns: int) -> Outgoing:
         """Diagnostics: status of the track, inputs taken and refused."""
-        problem = "" if state.track and state.history else "waiting for mocap and odometry"
+        moving = state.own if self.scenario.estimator.own_motion == "mocap" else state.history
+        problem = "" if state.track and moving else "waiting for mocap and odometry"
         status = self.tracker.status(state.track, now_ns)
         values: dict[str, object] = {"status": status.name.lower()}
         values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)

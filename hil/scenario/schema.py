@@ -22,6 +22,7 @@ EstimatorName = Literal["ekf", "ukf", "imm", "shape-ekf", "difference"]
 OfflineName = Literal["smoother"]
 OFFLINE_ESTIMATORS: tuple[OfflineName, ...] = get_args(OfflineName)
 FrontEnd = Literal["world", "body"]
+OwnMotion = Literal["odometry", "mocap", "fused"]
 
 
 class _Section(Struct, frozen=True, forbid_unknown_fields=True):
@@ -147,6 +148,7 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``front_end`` world: leader position and follower pose from mocap; body: range and bearing of the leader
     and the follower's own motion, taken as noisy, ``input_delay_s`` old when it is stamped, and as late as
     ``input_lag_s`` in acting (set it where commands stand in for odometry).
+    ``own_motion``: where v2 and u2 come from: odometry, the follower's own mocap track, or both fused.
     ``sigma_range``, ``sigma_bearing``: of a body-frame sensor; for mocap they follow from the geometry.
     ``turn_bandwidth``: q_u = turn_bandwidth * k_u^2 per second (0.5 agile, 0.03 gentle leaders).
     ``kind`` smoother is for replays only.
@@ -154,6 +156,7 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
 
     kind: EstimatorName | OfflineName = "ekf"
     front_end: FrontEnd = "world"
+    own_motion: OwnMotion = "odometry"
     sigma_position: Positive = 0.0003
     sigma_heading: Positive = 0.0035
     sigma_range: Positive = 0.01

@@ -1,0 +1,110 @@
+"""The estimator node where the follower's motion comes from its own mocap track."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from estimation.tracking import Status
+from formation.pose import Motion, Pose, advance
+from hil.emulator.lab_messages import frame_message, odometry_message
+from hil.nodes.estimator import EstimatorNode, EstimatorState
+from hil.nodes.lockstep import EPOCH_NS
+from hil.nodes.node import Event
+from hil.scenario.files import load_scenario
+from hil.wire import message_types as msg
+from hil.wire import topics
+from hil.wire.messages import decode_as, encode
+
+FRAME_NS = 8_333_333
+LATE_NS = 120_000_000
+OWN = Motion(0.1, 0.4)
+WRONG = Motion(0.3, -0.5)
+"""What the odometry of these tests claims."""
+
+
+def node_with(source: str, front_end: str = "world") -> EstimatorNode:
+    overrides = [f"estimator.own_motion={source}", f"estimator.front_end={front_end}"]
+    return EstimatorNode(load_scenario("turtlebot3", overrides))
+
+
+def frames(count: int) -> list[Event]:
+    generator = np.random.default_rng(2)
+    leader, follower, events = Pose(0.3, 0.0, 1.5), Pose(0.7, 0.1, 1.6), []
+    for k in range(count):
+        shake = generator.normal(size=5) * [3e-4, 3e-4, 3e-4, 3e-4, 3e-3]
+        seen = Pose(leader.x + shake[0], leader.y + shake[1], leader.theta)
+        own = Pose(follower.x + shake[2], follower.y + shake[3], follower.theta + shake[4])
+        message = frame_message(EPOCH_NS + k * FRAME_NS, k, [("leader", seen), ("follower", own)])
+        events.append(Event(topics.RIGID_BODIES, encode(message)))
+        leader = advance(leader, 0.08, 0.3, FRAME_NS * 1e-9)
+        follower = advance(follower, OWN.v, OWN.u, FRAME_NS * 1e-9)
+    return events
+
+
+def odometry(k: int, motion: Motion) -> Event:
+    message = odometry_message(EPOCH_NS + k * FRAME_NS, "follower", Pose(0.0, 0.0, 0.0), motion)
+    return Event("follower/odom", encode(message))
+
+
+def fed(node: EstimatorNode, events: list[Event]) -> tuple[EstimatorState, list[msg.LeaderEstimate]]:
+    state, found = node.begin(EPOCH_NS), []
+    now_ns = EPOCH_NS + 10 * 1_000_000_000
+    for event in events:
+        state, sent = node.step(state, event, now_ns)
+        found += [decode_as(m.payload, msg.LeaderEstimate) for m in sent if m.topic == node.topics.estimate]
+    return state, found
+
+
+@pytest.mark.parametrize("front_end", ["world", "body"])
+def test_the_own_track_takes_the_place_of_odometry(front_end: str) -> None:
+    state, found = fed(node_with("mocap", front_end), [odometry(0, WRONG), *frames(240)])
+    late = found[120:]
+    # With a heading noise of 3 mrad a turn rate is known to about 0.3 rad/s at any one moment.
+    assert np.mean([e.v2 for e in late]) == pytest.approx(OWN.v, abs=0.01)
+    assert np.mean([e.u2 for e in late]) == pytest.approx(OWN.u, abs=0.05)
+    assert np.std([e.u2 for e in late]) < 0.4
+    assert found[-1].v1 == pytest.approx(0.08, abs=0.02)
+    assert state.taken["used"] == 240
+
+
+def test_good_odometry_steadies_the_own_track_and_without_any_it_stands_alone() -> None:
+    mixed = [event for k, frame in enumerate(frames(240)) for event in (odometry(k, OWN), frame)]
+    _, both = fed(node_with("fused"), mixed)
+    _, alone = fed(node_with("mocap"), frames(240))
+    _, silent = fed(node_with("fused"), frames(240))
+    spread = [float(np.std([e.u2 for e in found[120:]])) for found in (both, alone)]
+    assert spread[0] < 0.5 * spread[1]
+    assert [e.u2 for e in silent] == [e.u2 for e in alone]
+
+
+@pytest.mark.parametrize("front_end", ["world", "body"])
+def test_late_frames_give_what_delivery_in_order_would_have_given(front_end: str) -> None:
+    node, events = node_with("mocap", front_end), frames(120)
+    shuffled = [*range(80), *(80 + k for k in np.random.default_rng(6).permutation(20)), *range(100, 120)]
+    in_order, expected = fed(node, events)
+    mixed, found = fed(node, [events[k] for k in shuffled])
+    assert mixed.taken["late"] > 5
+    assert not mixed.refused
+    assert (found[-1].v2, found[-1].u2) == pytest.approx((expected[-1].v2, expected[-1].u2), abs=1e-12)
+    for one, other in zip(mixed.track[-12:], in_order.track[-12:], strict=True):
+        np.testing.assert_allclose(one.belief.mean, other.belief.mean, atol=1e-9)
+        np.testing.assert_allclose(one.belief.covariance, other.belief.covariance, atol=1e-9)
+
+
+def test_frames_that_come_twice_or_too_late_leave_the_own_track_alone() -> None:
+    node, events = node_with("mocap"), frames(120)
+    state, _ = fed(node, events)
+    for again in (events[-1], events[50]):
+        after, out = node.step(state, again, EPOCH_NS + 10 * 1_000_000_000)
+        assert after.own is state.own
+        assert out == ()
+
+
+def test_without_odometry_it_does_not_wait_for_any() -> None:
+    node = node_with("mocap")
+    state, _ = fed(node, frames(60))
+    now_ns = EPOCH_NS + 60 * FRAME_NS
+    report = decode_as(node.report(state, now_ns).payload, msg.DiagnosticArray).status[0]
+    assert (report.level, report.message) == (0, "ok")
+    assert node.tracker.status(state.track, now_ns) is Status.TRACKING
