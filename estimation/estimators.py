@@ -1,22 +1,67 @@
-"""The registry of estimators: one name, one way to build each."""
+"""The registry of estimators: one name, one way to build each.
+
+An estimator's module is loaded when one is built, since the compiler and filterpy take a second to load.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from estimation.belief import Model
-from estimation.difference import DifferenceEstimator
-from estimation.imm import InteractingModels
-from estimation.kalman import ExtendedFilter, UnscentedFilter
-from estimation.shape_filter import ShapeFilter
 from estimation.tracking import Estimator
 
+
+def _ekf(model: Model, _cutoff: float) -> Estimator:
+    from estimation.compiled import CompiledExtended
+
+    return CompiledExtended(model)
+
+
+def _ukf(model: Model, _cutoff: float) -> Estimator:
+    from estimation.compiled import CompiledUnscented
+
+    return CompiledUnscented(model)
+
+
+def _ekf_filterpy(model: Model, _cutoff: float) -> Estimator:
+    from estimation.kalman import ExtendedFilter
+
+    return ExtendedFilter(model)
+
+
+def _ukf_filterpy(model: Model, _cutoff: float) -> Estimator:
+    from estimation.kalman import UnscentedFilter
+
+    return UnscentedFilter(model)
+
+
+def _imm(model: Model, _cutoff: float) -> Estimator:
+    from estimation.compiled import CompiledExtended
+    from estimation.imm import InteractingModels
+
+    return InteractingModels(model, make_filter=CompiledExtended)
+
+
+def _shape_ekf(model: Model, _cutoff: float) -> Estimator:
+    from estimation.shape_filter import ShapeFilter
+
+    return ShapeFilter(model)
+
+
+def _difference(model: Model, cutoff: float) -> Estimator:
+    from estimation.difference import DifferenceEstimator
+
+    return DifferenceEstimator(model, cutoff)
+
+
 ESTIMATORS: dict[str, Callable[[Model, float], Estimator]] = {
-    "ekf": lambda model, cutoff: ExtendedFilter(model),
-    "ukf": lambda model, cutoff: UnscentedFilter(model),
-    "imm": lambda model, cutoff: InteractingModels(model, ExtendedFilter),
-    "shape-ekf": lambda model, cutoff: ShapeFilter(model),
-    "difference": DifferenceEstimator,
+    "ekf": _ekf,
+    "ukf": _ukf,
+    "ekf-filterpy": _ekf_filterpy,
+    "ukf-filterpy": _ukf_filterpy,
+    "imm": _imm,
+    "shape-ekf": _shape_ekf,
+    "difference": _difference,
 }
 
 

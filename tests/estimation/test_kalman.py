@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from estimation.belief import Belief, Model, innovation
 from estimation.cramer_rao import TruePath, state_bound
 from estimation.estimators import make_estimator
-from estimation.kalman import ExtendedFilter, UnscentedFilter
 from estimation.measurement import FrontEnd, Measurement
 from estimation.motion import (
     FollowerMotion,
@@ -30,6 +29,7 @@ MODEL = Model(FrontEnd.WORLD, LIMITS, ProcessNoise.by_rule(LIMITS, 0.5))
 BODY = replace(MODEL, front_end=FrontEnd.BODY)
 STANDING = FollowerMotion(0.0, 0.0, 0.005, 0.03)
 SIGMA = 1e-3
+FILTERS = ("ekf", "ukf", "ekf-filterpy", "ukf-filterpy")
 
 
 def seen(position: Vector, step: int = 0, sigma: float = SIGMA) -> Measurement:
@@ -50,14 +50,12 @@ def random_leader(generator: np.random.Generator, steps: int) -> Matrix:
     return np.array(states)
 
 
-@pytest.mark.parametrize("kind", [ExtendedFilter, UnscentedFilter])
-def test_without_turning_it_is_the_textbook_kalman_filter(
-    kind: type[ExtendedFilter] | type[UnscentedFilter],
-) -> None:
+@pytest.mark.parametrize("kind", FILTERS)
+def test_without_turning_it_is_the_textbook_kalman_filter(kind: str) -> None:
     # A turn rate known to be zero makes the motion linear, a huge v_eps makes the noise isotropic. It is not
     # quite zero, as sigma points need a covariance of full rank.
     limits = LeaderLimits(v_eps=1e4, k_v=0.3, k_u=1e-6)
-    estimator = kind(Model(FrontEnd.WORLD, limits, ProcessNoise(9e-4, 1e-14, 1e4)))
+    estimator = make_estimator(kind, Model(FrontEnd.WORLD, limits, ProcessNoise(9e-4, 1e-14, 1e4)))
     generator = np.random.default_rng(1)
     truth = np.stack([0.2 * DT * np.arange(200), -0.1 * DT * np.arange(200)], axis=1)
     positions = truth + SIGMA * generator.standard_normal(truth.shape)
@@ -77,12 +75,15 @@ def test_without_turning_it_is_the_textbook_kalman_filter(
     assert belief.covariance[:4, :4] == pytest.approx(covariance, rel=1e-5, abs=1e-12)
 
 
+@pytest.mark.parametrize("pair", [("ekf", "ukf"), ("ekf-filterpy", "ukf-filterpy")])
 @pytest.mark.parametrize("model", [MODEL, BODY])
-def test_extended_and_unscented_agree_where_the_motion_is_nearly_linear(model: Model) -> None:
+def test_extended_and_unscented_agree_where_the_motion_is_nearly_linear(
+    pair: tuple[str, str], model: Model
+) -> None:
     follower = FollowerMotion(0.15, 0.4, 1e-4, 1e-4)
     belief = Belief(np.array([0.3, 0.1, 0.2, 0.05, 0.5]), np.diag([1e-8, 1e-8, 1e-7, 1e-7, 1e-6]))
     after: list[Belief] = []
-    for estimator in (ExtendedFilter(model), UnscentedFilter(model)):
+    for estimator in (make_estimator(kind, model) for kind in pair):
         prior = estimator.predict(belief, DT, follower)
         after.append(estimator.update(prior, seen(prior.mean[0:2] + 1e-4, sigma=1e-4)))
     assert after[0].mean == pytest.approx(after[1].mean, abs=1e-8)
@@ -114,7 +115,7 @@ any_steps = st.builds(
 )
 
 
-@pytest.mark.parametrize("kind", ["ekf", "ukf"])
+@pytest.mark.parametrize("kind", FILTERS)
 @pytest.mark.parametrize("model", [MODEL, BODY])
 @given(steps=st.lists(any_steps, min_size=1, max_size=12))
 @settings(deadline=None, max_examples=60)
@@ -131,7 +132,7 @@ def test_covariance_stays_symmetric_and_positive_definite_whatever_comes(
         assert np.linalg.eigvalsh(belief.covariance / np.outer(scale, scale)).min() > 0.0
 
 
-@pytest.mark.parametrize("kind", ["ekf", "ukf"])
+@pytest.mark.parametrize("kind", FILTERS)
 def test_prediction_and_update_leave_their_arguments_alone(kind: str) -> None:
     estimator = make_estimator(kind, MODEL)
     before = estimator.start(seen(np.array([0.1, 0.2])))
@@ -148,7 +149,7 @@ def test_prediction_and_update_leave_their_arguments_alone(kind: str) -> None:
     assert np.array_equal(first.covariance, again.covariance)
 
 
-@pytest.mark.parametrize("kind", ["ekf", "ukf"])
+@pytest.mark.parametrize("kind", FILTERS)
 def test_on_random_leaders_it_is_consistent_and_close_to_the_bound(kind: str) -> None:
     runs, steps, late = 16, 420, 180
     generator = np.random.default_rng(21)

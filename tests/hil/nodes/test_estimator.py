@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -13,10 +15,13 @@ from estimation.tracking import Status
 from formation.pose import Motion, Pose, advance
 from formation.shape import shape_of
 from hil.emulator.lab_messages import frame_message, odometry_message
+from hil.log.reader import read_log
 from hil.nodes.estimator import EstimatorNode, EstimatorState
 from hil.nodes.lockstep import EPOCH_NS
+from hil.nodes.lockstep_run import run_lockstep
 from hil.nodes.node import TICK, Event, Outgoing, digest
 from hil.scenario.files import load_scenario
+from hil.scenario.schema import EstimatorName
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.messages import decode_as, encode, header, to_ns
@@ -126,19 +131,26 @@ def damaged_frames(draw: st.DrawFn) -> bytes:
     return bytes(payload)
 
 
-@given(damaged_frames(), st.sampled_from(["ekf", "ukf", "difference"]), st.booleans())
-@settings(deadline=None, max_examples=150)
-def test_no_damaged_frame_raises_and_what_leaves_is_finite(payload: bytes, kind: str, body: bool) -> None:
-    overrides = [f"estimator.kind={kind}", f"estimator.front_end={'body' if body else 'world'}"]
+@cache
+def warmed(kind: str, front_end: str) -> tuple[EstimatorNode, EstimatorState]:
+    """An estimator of any kind that has followed the leader for half a second."""
+    overrides = [f"estimator.kind={kind}", f"estimator.front_end={front_end}"]
     node = EstimatorNode(load_scenario("turtlebot3", overrides))
+    return node, fed(drive(60), node)[0]
+
+
+@given(damaged_frames(), st.sampled_from(list(ESTIMATORS)), st.sampled_from(["world", "body"]))
+@settings(deadline=None, max_examples=200)
+def test_no_damaged_frame_raises_and_what_leaves_is_finite(payload: bytes, kind: str, front_end: str) -> None:
+    node, warm = warmed(kind, front_end)
     for repeats in ([(WARM_NS, Event(topics.RIGID_BODIES, payload))] * 2, [frame(61, PAIR), frame(62, PAIR)]):
-        _, sent = fed(repeats, node, WARM)
+        _, sent = fed(repeats, node, warm)
         for found in estimates(sent):
             assert all(map(math.isfinite, (found.rho, found.alpha2, found.v1, found.alpha1, found.u1)))
             assert np.isfinite(found.covariance).all()
 
 
-@pytest.mark.parametrize("kind", ["ekf", "ukf", "difference"])
+@pytest.mark.parametrize("kind", ESTIMATORS)
 @pytest.mark.parametrize("front_end", ["world", "body"])
 def test_leaders_at_the_end_of_the_world_break_nothing(kind: str, front_end: str) -> None:
     overrides = [f"estimator.kind={kind}", f"estimator.front_end={front_end}"]
@@ -238,3 +250,44 @@ def test_diagnostics_name_what_is_missing_and_what_was_counted() -> None:
     values = {value.key: value.value for value in after.values}
     assert (after.level, after.message, after.name) == (0, "ok", "abreast/estimator")
     assert (values["status"], values["taken.frames"], values["refused.malformed"]) == ("tracking", "60", "1")
+
+
+def test_a_scenario_may_name_every_estimator() -> None:
+    assert set(get_args(EstimatorName)) == set(ESTIMATORS)
+
+
+@pytest.fixture(scope="module")
+def rough_inputs(tmp_path_factory: pytest.TempPathFactory) -> list[Timed]:
+    """Frames and odometry of a lockstep run with loss and jitter, as they arrived."""
+    path = tmp_path_factory.mktemp("rough") / "run.mcap"
+    given = ("run.duration_s=4", "run.seed=7", "mocap.loss=0.05", "mocap.jitter_s=0.02")
+    run_lockstep(load_scenario("turtlebot3", given), path)
+    return [
+        (record.log_ns, Event(record.topic, record.payload))
+        for record in read_log(path).records([topics.RIGID_BODIES, "follower/odom"])
+    ]
+
+
+@pytest.mark.parametrize("front_end", ["world", "body"])
+@pytest.mark.parametrize("kind", ["ekf", "ukf"])
+def test_over_a_whole_log_the_compiled_filter_is_filterpys(
+    rough_inputs: list[Timed], kind: str, front_end: str
+) -> None:
+    given = [f"estimator.front_end={front_end}"]
+    nodes = [
+        EstimatorNode(load_scenario("turtlebot3", [f"estimator.kind={kind}{suffix}", *given]))
+        for suffix in ("", "-filterpy")
+    ]
+    left, right = (node.begin(EPOCH_NS) for node in nodes)
+    compared = 0
+    for event in rough_inputs:
+        (left, _), (right, _) = (fed([event], node, s) for node, s in zip(nodes, (left, right), strict=True))
+        for found, wanted in zip(left.track[-1:], right.track[-1:], strict=True):
+            assert (found.verdict, found.settled) == (wanted.verdict, wanted.settled)
+            sd = np.sqrt(np.diag(wanted.belief.covariance))
+            change = found.belief.covariance - wanted.belief.covariance
+            assert np.all(np.abs(found.belief.mean - wanted.belief.mean) <= 1e-9 * sd)
+            assert np.all(np.abs(change) <= 1e-9 * np.outer(sd, sd))
+            compared += 1
+    assert compared > 400
+    assert left.taken == right.taken

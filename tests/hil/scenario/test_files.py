@@ -41,7 +41,7 @@ TABLE = "leader.program={kind='table', t=[0.0, 1.0], v=[0.1, 'fast'], u=[0, 0]}"
         ("run.seed=1.5", r"run\.seed is 1\.5: expected int, got float"),
         ("leader.name='two words'", r"leader\.name is 'two words': expected str matching"),
         ("controller.law=best", r"controller\.law is 'best': expected one of 'independent', 'ideal'"),
-        ("estimator.kind=kalman", r"estimator\.kind is 'kalman': expected one of 'ekf', 'ukf', 'imm', "),
+        ("estimator.kind=kalman", r"estimator\.kind is 'kalman': expected one of 'ekf', 'ukf', "),
         ("leader.program.kind=spiral", r"kind is 'spiral': expected one of 'constant', .*'table'"),
         ("mocap=3", r"mocap is 3: expected a section, got int"),
         (TABLE, r"leader\.program\.v\[1\]: expected float, got str"),
