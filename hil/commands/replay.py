@@ -50,6 +50,7 @@ def command(
     --from and --to are seconds since the leader set off, for imported recordings the source's own time; the
     steps always begin where the log does.
     """
+    from hil.judge.own_motion import judge_own_motion
     from hil.judge.summary import summarise
     from hil.judge.summary_text import print_summary
     from hil.log.reader import read_log
@@ -61,6 +62,8 @@ def command(
     played = _played(given, chart, estimator, leader, follower, verify=verify)
     evidence = evidence_of_replay(given, played, from_s, to_s)
     summary = summarise(evidence)
+    if chart is None and (own_motion := judge_own_motion(given, played.scenario)):
+        summary["own_motion"] = own_motion
     if verify:
         summary["parity"] = parity_json(played)
     _write(evidence, summary, table, out)
