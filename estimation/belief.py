@@ -9,7 +9,7 @@ import numpy as np
 
 from estimation import motion
 from estimation.measurement import FrontEnd, Measurement
-from estimation.memory import Guess, ShapeState
+from estimation.memory import Guess, Horizon, ShapeState
 from estimation.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise, Vector
 
 
@@ -45,7 +45,7 @@ class Belief:
     covariance: Matrix
     rates: Rates | None = None
     elapsed: float = 0.0
-    memory: Modes | Guess | ShapeState | None = None
+    memory: Modes | Guess | ShapeState | Horizon | None = None
 
     @property
     def speed(self) -> float:

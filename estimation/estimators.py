@@ -48,6 +48,12 @@ def _shape_ekf(model: Model, _cutoff: float) -> Estimator:
     return ShapeFilter(model)
 
 
+def _mhe(model: Model, _cutoff: float) -> Estimator:
+    from estimation.moving_horizon import MovingHorizon
+
+    return MovingHorizon(model)
+
+
 def _difference(model: Model, cutoff: float) -> Estimator:
     from estimation.difference import DifferenceEstimator
 
@@ -61,6 +67,7 @@ ESTIMATORS: dict[str, Callable[[Model, float], Estimator]] = {
     "ukf-filterpy": _ukf_filterpy,
     "imm": _imm,
     "shape-ekf": _shape_ekf,
+    "mhe": _mhe,
     "difference": _difference,
 }
 

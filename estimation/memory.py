@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from estimation.motion import Matrix, Vector
+from estimation.motion import FollowerMotion, Matrix, Vector
 from formation.pose import Pose
 
 
@@ -36,3 +36,31 @@ class ShapeState:
     pose: Pose | None = None
     position_noise: float = 0.0
     heading_noise: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One moment of a window: how long after the one before [s], and how the follower moved in between.
+
+    drive: covariance (5, 5) that the motion since then adds. state: (5,), where the problem is linearised.
+    seen: (2,) [m], the leader's position, with its covariance noise (2, 2) [m^2]; None without a measurement.
+    """
+
+    dt: float
+    follower: FollowerMotion
+    drive: Matrix
+    state: Vector
+    seen: Vector | None = None
+    noise: Matrix | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Horizon:
+    """The window of a moving-horizon estimator: its moments, and what all before says of the first of them.
+
+    mean (5,) and covariance (5, 5): the arrival cost, without the measurement of the first moment.
+    """
+
+    mean: Vector
+    covariance: Matrix
+    stages: tuple[Stage, ...]

@@ -18,7 +18,7 @@ Name = Annotated[str, Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 PoseTriple = tuple[float, float, float]
 
 LawName = Literal["independent", "ideal"]
-EstimatorName = Literal["ekf", "ukf", "ekf-filterpy", "ukf-filterpy", "imm", "shape-ekf", "difference"]
+EstimatorName = Literal["ekf", "ukf", "ekf-filterpy", "ukf-filterpy", "imm", "shape-ekf", "mhe", "difference"]
 OfflineName = Literal["smoother"]
 OFFLINE_ESTIMATORS: tuple[OfflineName, ...] = get_args(OfflineName)
 FrontEnd = Literal["world", "body"]
