@@ -1,0 +1,102 @@
+"""What one step of a filter costs from Python: the compiled filters against filterpy's, interleaved.
+
+    python benchmarks/filter_step.py [--rounds 200]
+
+A step is one prediction and one update through the interface of all estimators. ``kernels`` is the same step
+without that interface, ``beliefs`` what it costs to build the two beliefs that a step hands out. Medians over
+the rounds; the ratio is the median of the ratios within a round, so that a busy machine slows both sides.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from estimation import kernels
+from estimation.belief import Belief, Model
+from estimation.estimators import make_estimator
+from estimation.measurement import FrontEnd, Measurement
+from estimation.motion import FollowerMotion, LeaderLimits, ProcessNoise
+
+DT = 1.0 / 120.0
+LIMITS = LeaderLimits(v_eps=0.04, k_v=0.22, k_u=0.7)
+WORLD = Model(FrontEnd.WORLD, LIMITS, ProcessNoise.by_rule(LIMITS, 0.5))
+FOLLOWER = FollowerMotion(0.1, 0.2, 5e-3, 3e-2)
+SEEN = Measurement(0, np.array([0.3, 0.1]), 1e-6 * np.eye(2), FOLLOWER)
+TARGETS = {"ekf": 20.0, "ukf": 50.0}
+
+Step = Callable[[], object]
+
+
+def settled(model: Model) -> Belief:
+    """A belief as it is in mid-run."""
+    estimator = make_estimator("ekf", model)
+    belief = estimator.start(SEEN)
+    for _ in range(60):
+        belief = estimator.update(estimator.predict(belief, DT, FOLLOWER), SEEN)
+    return belief
+
+
+def step_of(name: str, model: Model, belief: Belief) -> Step:
+    estimator = make_estimator(name, model)
+    return lambda: estimator.update(estimator.predict(belief, DT, FOLLOWER), SEEN)
+
+
+def kernel_step(name: str, model: Model, belief: Belief) -> Step:
+    predict = kernels.extended_predict if name == "ekf" else kernels.unscented_predict
+    own = FOLLOWER if model.front_end is FrontEnd.BODY else FollowerMotion(0.0, 0.0, 0.0, 0.0)
+    given, drive = model.noise, (own.v2, own.u2, own.sd_v2, own.sd_u2)
+    noise = np.array([given.q_v, given.q_u, given.v_eps, given.q_start, model.input_correlation])
+    mean, covariance, after, joint = np.empty(5), np.empty((5, 5)), np.empty(5), np.empty((5, 5))
+
+    def step() -> None:
+        predict(belief.mean, belief.covariance, DT, *drive, noise, mean, covariance)
+        kernels.update(mean, covariance, SEEN.position, SEEN.covariance, after, joint)
+
+    return step
+
+
+def belief_pair(belief: Belief) -> Step:
+    mean, covariance = belief.mean, belief.covariance
+    return lambda: (Belief(mean, covariance), Belief(mean, covariance))
+
+
+def seconds_each(step: Step, count: int) -> float:
+    begin = time.perf_counter()
+    for _ in range(count):
+        step()
+    return (time.perf_counter() - begin) / count
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=200)
+    rounds = parser.parse_args().rounds
+    print("filter  front   filterpy  compiled   kernels   beliefs   ratio  target  ratio of kernels")
+    for model in (WORLD, replace(WORLD, front_end=FrontEnd.BODY)):
+        belief = settled(model)
+        for name, target in TARGETS.items():
+            timed = [
+                (step_of(f"{name}-filterpy", model, belief), 10),
+                (step_of(name, model, belief), 100),
+                (kernel_step(name, model, belief), 100),
+                (belief_pair(belief), 100),
+            ]
+            took = np.array([[seconds_each(step, count) for step, count in timed] for _ in range(rounds)])
+            times = "  ".join(f"{1e6 * each:5.1f} us" for each in np.median(took, axis=0))
+            ratio, bare = (float(np.median(took[:, 0] / took[:, k])) for k in (1, 2))
+            print(
+                f"{name:6}  {model.front_end.value:5}  {times}  {ratio:5.1f}x  {target:5.0f}x  {bare:15.1f}x"
+            )
+
+
+if __name__ == "__main__":
+    main()
