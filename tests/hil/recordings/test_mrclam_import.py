@@ -10,12 +10,14 @@ import pytest
 from formation.pose import Pose, advance
 from hil.command_line import main
 from hil.errors import UsageError
+from hil.judge.own_motion import judge_own_motion
 from hil.judge.summary import summarise
 from hil.log.metadata import mode_of, scenario_of
 from hil.log.reader import Log, read_log
 from hil.recordings.mrclam_import import import_mrclam
 from hil.replay.rerun import replay
 from hil.replay.verdict import evidence_of_replay
+from hil.scenario.files import load_scenario, with_overrides
 from hil.wire import topics
 from hil.wire.message_types import Odometry, RigidBodies, Truth
 from hil.wire.messages import decode_as, to_ns
@@ -143,9 +145,14 @@ def first_minute(out: Path, leader: int, follower: int) -> Path:
 
 
 @pytest.mark.skipif(REAL not in os.environ, reason=f"{REAL} does not name the folder of real recordings")
-def test_a_real_leader_is_followed_by_motion_capture(tmp_path: Path) -> None:
+def test_a_real_leader_is_followed_and_commands_are_seen_to_run_ahead(tmp_path: Path) -> None:
     import_mrclam(first_minute(tmp_path / "mrclam6", 1, 2), 1, 2, tmp_path / "real.mcap")
     log = read_log(tmp_path / "real.mcap")
-    estimation = summarise(evidence_of_replay(log, replay(log)))["estimation"]
+    scenario = with_overrides(scenario_of(log) or load_scenario("mrclam"), ["estimator.own_motion=mocap"])
+    estimation = summarise(evidence_of_replay(log, replay(log, scenario)))["estimation"]
     assert estimation["samples"] > 3000
     assert estimation["rmse"]["v1"] <= 0.014
+    own = judge_own_motion(log, scenario)
+    assert 0.15 < own["delay_s"] < 0.35
+    assert 0.8 < own["scale_v"] < 1.0
+    assert 0.75 < own["scale_u"] < 1.0
