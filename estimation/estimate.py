@@ -85,14 +85,21 @@ def _in_body_frame(belief: Belief, measurement: Measurement) -> tuple[Vector, Ma
     pose, noise = measurement.pose, measurement.pose_noise
     if pose is None or noise is None:
         return belief.mean, belief.covariance
-    cos_t, sin_t = math.cos(pose.theta), math.sin(pose.theta)
-    rotation = np.eye(5)
-    rotation[0:2, 0:2] = rotation[2:4, 2:4] = [[cos_t, sin_t], [-sin_t, cos_t]]
-    offset = np.array([pose.x, pose.y, 0.0, 0.0, 0.0])
-    mean = rotation @ (belief.mean - offset)
-    px, py, wx, wy, _ = mean.tolist()
-    by_heading = np.array([py, -px, wy, -wx, 0.0]) * noise.heading
-    covariance = rotation @ belief.covariance @ rotation.T + np.outer(by_heading, by_heading)
+    c, s = math.cos(pose.theta), math.sin(pose.theta)
+    rotation = np.array(
+        [
+            [c, s, 0.0, 0.0, 0.0],
+            [-s, c, 0.0, 0.0, 0.0],
+            [0.0, 0.0, c, s, 0.0],
+            [0.0, 0.0, -s, c, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+    x, y, wx, wy, u1 = belief.mean.tolist()
+    dx, dy = x - pose.x, y - pose.y
+    mean = np.array([c * dx + s * dy, c * dy - s * dx, c * wx + s * wy, c * wy - s * wx, u1])
+    by_heading = np.array([mean[1], -mean[0], mean[3], -mean[2], 0.0]) * noise.heading
+    covariance = rotation @ belief.covariance @ rotation.T + by_heading[:, None] * by_heading
     covariance[0, 0] += noise.position**2
     covariance[1, 1] += noise.position**2
     return mean, covariance

@@ -59,9 +59,9 @@ def motion_at(history: History, stamp_ns: int) -> MotionSample | None:
 class InputTrust:
     """What is known of the follower's motion signal.
 
-    sd_v2 [m/s], sd_u2 [rad/s]: its noise while the motion is steady. delay [s]: how long after the motion the
-    signal is stamped. lag [s]: by how much less or more than that the robot may follow the signal, as a
-    commanded speed runs ahead of the wheels; while the signal changes it is trusted that much less.
+    sd_v2 [m/s], sd_u2 [rad/s]: its noise while the motion is steady. delay [s]: how long the motion comes
+    after its signal, as the wheels follow a command. lag [s]: by how much more than that it may come later;
+    while the signal changes it is trusted that much less.
     """
 
     sd_v2: float

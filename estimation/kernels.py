@@ -126,7 +126,7 @@ def _add_noise(covariance: Matrix, w: Pair, dt: float, back: Pair, noise: Vector
     q_v, q_u, v_eps, q_start = noise[0], noise[1], noise[2], noise[3]
     squared, floor = w[0] * w[0] + w[1] * w[1], v_eps * v_eps
     weight = q_v / (squared + floor)
-    start = q_start * max(0.0, 1.0 - 4.0 * squared / floor)
+    start = q_start * max(0.0, 1.0 - squared / floor)
     wx, wy = _times(back, w)
     xx, xy, yy = weight * (wx * wx + floor) + start, weight * wx * wy, weight * (wy * wy + floor) + start
     for i, j, share in ((0, 0, dt * dt * dt / 3.0), (0, 2, dt * dt / 2.0), (2, 0, dt * dt / 2.0), (2, 2, dt)):

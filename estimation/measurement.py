@@ -15,6 +15,8 @@ import numpy as np
 from estimation.motion import FollowerMotion, Matrix, Vector
 from formation.pose import Pose
 
+_UNIT = np.eye(2)
+
 
 class FrontEnd(Enum):
     """In which frame the leader is tracked."""
@@ -53,7 +55,7 @@ def measure_world(
     capture_ns: int, leader: tuple[float, float], follower: Pose, noise: PoseNoise, motion: FollowerMotion
 ) -> Measurement:
     """World front end: the leader's mocap position, with covariance sigma_p^2 I."""
-    covariance = noise.position**2 * np.eye(2)
+    covariance = noise.position**2 * _UNIT
     return Measurement(capture_ns, np.array(leader), covariance, motion, follower, noise)
 
 

@@ -35,8 +35,8 @@ class ProcessNoise:
 
     ``q_v`` [m^2/s^3] drives the speed, ``q_u`` [rad^2/s^3] the turn rate. ``v_eps`` [m/s] is the speed below
     which the direction of motion is not trusted, so that the noise of w becomes isotropic. A leader slower
-    than half of it stands or sets off, which the model of steady driving knows nothing of: there w is driven
-    by up to ``q_start`` [m^2/s^3] more.
+    than that stands or sets off, which the model of steady driving knows nothing of: there w is driven by up
+    to ``q_start`` [m^2/s^3] more.
     """
 
     q_v: float
@@ -118,7 +118,7 @@ def process_noise(mean: Vector, dt: float, noise: ProcessNoise) -> Matrix:
     wx, wy = float(mean[2]), float(mean[3])
     squared, floor = wx * wx + wy * wy, noise.v_eps**2
     weight = noise.q_v / (squared + floor)
-    start = noise.q_start * max(0.0, 1.0 - 4.0 * squared / floor)
+    start = noise.q_start * max(0.0, 1.0 - squared / floor)
     xx, xy, yy = weight * (wx * wx + floor) + start, weight * wx * wy, weight * (wy * wy + floor) + start
     q = np.zeros((STATE_SIZE, STATE_SIZE))
     along = np.array([[xx, xy], [xy, yy]])

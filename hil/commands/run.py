@@ -79,10 +79,11 @@ def _folder(scenario: Scenario, out: Path | None) -> Path:
 
 
 def _lockstep(scenario: Scenario, log_path: Path) -> str:
-    from hil.nodes.lockstep_run import run_lockstep
+    from hil.nodes.lockstep_run import make_nodes, run_lockstep
 
+    nodes = make_nodes(scenario)
     begun = time.perf_counter()
-    run_lockstep(scenario, log_path)
+    run_lockstep(scenario, log_path, nodes)
     took = time.perf_counter() - begun
     click.echo(
         f"{scenario.run.duration_s:g} s in lockstep in {took:.2f} s "

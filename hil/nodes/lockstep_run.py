@@ -23,18 +23,23 @@ STOPPING_NS = 600_000_000
 """Time given to the robots to come to rest after the stop, so that the log shows that they did."""
 
 
-def run_lockstep(scenario: Scenario, log_path: Path) -> None:
+def make_nodes(scenario: Scenario) -> list[Node[Any]]:
+    """The nodes of a run; making them loads and compiles all that they need."""
+    return [EmulatorNode(scenario), EstimatorNode(scenario), ControllerNode(scenario)]
+
+
+def run_lockstep(scenario: Scenario, log_path: Path, nodes: list[Node[Any]] | None = None) -> None:
     """Run a scenario from the start barrier to standstill and write everything to ``log_path``.
 
-    Raises :class:`CheckFailedError` if the leader never sets off.
+    ``nodes``: those of :func:`make_nodes`, if they have been made before. Raises :class:`CheckFailedError`
+    if the leader never sets off.
     """
     with LogWriter(log_path, log_metadata(scenario, "lockstep")) as log:
 
         def record(message: Outgoing, now_ns: int) -> None:
             log.write(message.topic, message.typename, message.payload, now_ns, now_ns)
 
-        nodes: list[Node[Any]] = [EmulatorNode(scenario), EstimatorNode(scenario), ControllerNode(scenario)]
-        lockstep = Lockstep(nodes, record)
+        lockstep = Lockstep(nodes or make_nodes(scenario), record)
         # What was imported and built so far stays for good: the collector need not walk it again and again.
         gc.freeze()
         since_ns = _wait_for_motion(lockstep)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Protocol, TypeVar
+
+from msgspec import Struct
 
 from hil.wire.message_types import Consumed, DiagnosticArray, DiagnosticStatus, KeyValue, Message
 from hil.wire.messages import encode, header, to_time, typename_of
@@ -19,8 +20,7 @@ S = TypeVar("S")
 Counts = Mapping[str, int]
 
 
-@dataclass(frozen=True, slots=True)
-class Event:
+class Event(Struct, frozen=True):
     """What happens to a node: a payload on a topic or, with an empty ``topic``, the passing of time."""
 
     topic: str = ""
@@ -30,8 +30,7 @@ class Event:
 TICK = Event()
 
 
-@dataclass(frozen=True, slots=True)
-class Outgoing:
+class Outgoing(Struct, frozen=True):
     """A message that a node wants published; ``stamp_ns`` is the time that it speaks of."""
 
     topic: str

@@ -146,8 +146,8 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     """The estimator: which one, what it measures with, and its noise by rule.
 
     ``front_end`` world: leader position and follower pose from mocap; body: range and bearing of the leader
-    and the follower's own motion, taken as noisy, ``input_delay_s`` old when it is stamped, and as late as
-    ``input_lag_s`` in acting (set it where commands stand in for odometry).
+    and the follower's own motion, taken as noisy. Where commands stand in for odometry the motion comes
+    ``input_delay_s`` after its signal, and up to ``input_lag_s`` later still.
     ``own_motion``: where v2 and u2 come from: odometry, the follower's own mocap track, or both fused.
     ``sigma_range``, ``sigma_bearing``: of a body-frame sensor; for mocap they follow from the geometry.
     ``turn_bandwidth``: q_u = turn_bandwidth * k_u^2 per second (0.5 agile, 0.03 gentle leaders).

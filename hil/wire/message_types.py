@@ -1,7 +1,8 @@
 """The messages that flow between the daemons, as typed Python classes.
 
-Our own and the motion-capture types are frozen dataclasses with the fields of the ``.msg`` files under
-``hil/wire/msg``, where units, frames and signs are stated. The standard ROS 2 types are those of ``rosbags``.
+Our own and the motion-capture types are dataclasses with the fields of the ``.msg`` files under
+``hil/wire/msg``, where units, frames and signs are stated; they are not frozen, as a frozen one takes three
+times as long to make, and a run makes thousands a second. The standard ROS 2 types are those of ``rosbags``.
 Sequences of a decoded message are lists, numeric arrays are read-only numpy arrays.
 """
 
@@ -38,7 +39,7 @@ class Message(Protocol):
     __msgtype__: ClassVar[str]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Marker:
     """One motion-capture marker."""
 
@@ -49,7 +50,7 @@ class Marker:
     __msgtype__: ClassVar[str] = "mocap4r2_msgs/msg/Marker"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class RigidBody:
     """One motion-capture body; nothing in it tells a tracked body from a lost one."""
 
@@ -59,7 +60,7 @@ class RigidBody:
     __msgtype__: ClassVar[str] = "mocap4r2_msgs/msg/RigidBody"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class RigidBodies:
     """One motion-capture frame, stamped with its capture time."""
 
@@ -69,7 +70,7 @@ class RigidBodies:
     __msgtype__: ClassVar[str] = "mocap4r2_msgs/msg/RigidBodies"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Consumed:
     """Receipt of one input: digest of its payload and when it was taken in."""
 
@@ -78,7 +79,7 @@ class Consumed:
     __msgtype__: ClassVar[str] = "abreast_msgs/msg/Consumed"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class LeaderEstimate:
     """What a follower believes about its leader at ``header.stamp``.
 
@@ -108,7 +109,7 @@ class LeaderEstimate:
     __msgtype__: ClassVar[str] = "abreast_msgs/msg/LeaderEstimate"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Command:
     """A controller's decision and what it rests on; the robot itself gets a ``TwistStamped`` or ``Twist``."""
 
@@ -126,7 +127,7 @@ class Command:
     __msgtype__: ClassVar[str] = "abreast_msgs/msg/Command"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Truth:
     """True state of an emulated pair in the world frame; only judges may read it."""
 
@@ -145,7 +146,7 @@ class Truth:
     __msgtype__: ClassVar[str] = "abreast_msgs/msg/Truth"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class RangeBearing:
     """The leader as a sensor on the follower sees it."""
 
@@ -155,7 +156,7 @@ class RangeBearing:
     __msgtype__: ClassVar[str] = "abreast_msgs/msg/RangeBearing"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class Malformed:
     """A payload that could not be decoded; ``payload`` is uint8 of shape (n,)."""
 

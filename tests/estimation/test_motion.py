@@ -181,7 +181,7 @@ def test_noise_drives_the_speed_and_leaves_the_direction_to_the_turn_rate() -> N
 
 def test_only_a_leader_that_stands_is_expected_to_set_off() -> None:
     without = replace(NOISE, q_start=0.0)
-    for speed, more in ((0.0, True), (0.019, True), (0.02, False), (0.3, False)):
+    for speed, more in ((0.0, True), (0.039, True), (0.04, False), (0.3, False)):
         state = np.array([0.0, 0.0, 0.0, speed, 0.1])
         added = process_noise(state, 0.01, NOISE) - process_noise(state, 0.01, without)
         assert (added.any() > 0) == more
