@@ -142,4 +142,6 @@ def _typestore() -> Typestore:
         store.register(get_types_from_msg(text, name))
     for kind in OWN_TYPES:
         store.types[kind.__msgtype__] = kind
+    # The generated code asks for the definition of every nested field, some eighty times a frame.
+    store.get_msgdef = functools.cache(store.get_msgdef)  # type: ignore[method-assign]
     return store
