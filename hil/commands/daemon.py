@@ -11,6 +11,7 @@ from hil.errors import UsageError
 from hil.live.daemon import Ending, NodeWorker, Worker, run_daemon
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
+from hil.wire.messages import prepare
 from hil.wire.session import Endpoints
 from hil.wire.topics import topics_of
 
@@ -44,6 +45,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         def say_ready() -> None:
             click.echo(f"abreast {name}: ready, {chosen.name} on {endpoints.describe()}", err=True)
 
+        prepare(topics_of(chosen).types.values())
         dropped = run_daemon(
             lambda: _WORKERS[name](chosen, out, needed),
             topics_of(chosen),

@@ -17,6 +17,7 @@ from hil.nodes.node import Node, Outgoing, outgoing
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.message_types import String
+from hil.wire.messages import prepare
 
 START_TIMEOUT_NS = 10_000_000_000
 STOPPING_NS = 600_000_000
@@ -25,6 +26,7 @@ STOPPING_NS = 600_000_000
 
 def make_nodes(scenario: Scenario) -> list[Node[Any]]:
     """The nodes of a run; making them loads and compiles all that they need."""
+    prepare(topics.topics_of(scenario).types.values())
     return [EmulatorNode(scenario), EstimatorNode(scenario), ControllerNode(scenario)]
 
 

@@ -7,6 +7,7 @@ can build ROS packages from the very same files.
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TypeVar, cast
 
@@ -26,6 +27,12 @@ _SEPARATOR = "=" * 80
 
 class MalformedPayloadError(AbreastError):
     """A payload that is not a valid message of the type it was taken for."""
+
+
+def prepare(typenames: Iterable[str]) -> None:
+    """Generate the code for messages of these types now, so that the first of each need not wait for it."""
+    for typename in typenames:
+        _typestore().get_msgdef(typename)
 
 
 def encode(message: Message) -> bytes:
