@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import threading
@@ -132,6 +133,8 @@ def run_daemon(
         worker = make_worker()
         worker.begin(time.time_ns())
         wire.subscribe(worker.subscribes)
+        # What is loaded by now stays for good; walking it again would halt a live step for 100 ms and more.
+        gc.freeze()
         on_ready()
         until = None if duration_s is None else time.monotonic() + duration_s
         while not ending.asked and (until is None or time.monotonic() < until):
