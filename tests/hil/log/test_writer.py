@@ -68,7 +68,7 @@ def test_every_type_opens_in_rosbags_and_mcap_ros2(
         decoded = list(reader.iter_decoded_messages())
         assert {record.name: record.metadata for record in reader.iter_metadata()} == METADATA
         recorded = reader.get_header()
-    assert (recorded.profile, recorded.library.split()[0]) == ("ros2", "abreast")
+    assert (recorded.profile, recorded.library.partition(" ")[0]) == ("ros2", "abreast")
     assert len(decoded) == total
     for entry in decoded:
         expected = sample_messages[entry.channel.topic]
