@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace as with_changes
 
 from msgspec import Struct, field
 from msgspec.structs import replace
 
 from controllers.guard import Decision, decide
 from controllers.laws import LAWS
+from controllers.resolution import NOTHING_OWED, Resolution
 from estimation.estimate import Estimate
 from estimation.prediction import SentCommand, predict_shape
 from estimation.tracking import Status
@@ -45,13 +47,15 @@ class ControllerState(Struct, frozen=True):
 
     ``estimate``: the newest one that may move the robot; ``status``: of the newest one of any kind.
     ``sent``: commands since that estimate's capture, oldest first, and the one before. ``leader_u1``: the
-    turn rate that the leader was told to drive, kept for the law ``ideal``, nan before it is known.
+    turn rate that the leader was told to drive, kept for the law ``ideal``, nan before it is known. ``owed``:
+    what rounding to the robot's steps took off the last command.
     """
 
     estimate: Estimate | None = None
     status: Status = Status.INITIALISING
     stopped: bool = False
     sent: tuple[SentCommand, ...] = ()
+    owed: Motion = NOTHING_OWED
     receipts: tuple[msg.Consumed, ...] = ()
     refused: Counts = field(default_factory=no_counts)
     decided: Counts = field(default_factory=no_counts)
@@ -71,6 +75,7 @@ class ControllerNode:
         self.topics = topics_of(scenario)
         self.law = LAWS[given.law]
         self.gains, self.limits = gains(scenario), limits(scenario)
+        self.resolution = Resolution(given.v_resolution, given.u_resolution)
         self.max_age = given.max_age_s
         self.lag = given.lag_s
         self.transport_ns = round(given.transport_s / _NS)
@@ -124,12 +129,16 @@ class ControllerNode:
     def _command(
         self, state: ControllerState, now_ns: int, *, fresh: bool
     ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
-        decision = self._decide(state, now_ns)
+        decision, owed = self._decide(state, now_ns), NOTHING_OWED
+        if decision.stop is None:
+            sent, owed = self.resolution.round(decision.sent, state.owed, self.limits)
+            decision = with_changes(decision, sent=sent)
         acting = SentCommand(now_ns + self.transport_ns, decision.sent.v, decision.sent.u)
         receipts = state.receipts
         state = replace(
             state,
             sent=self._recent((*state.sent, acting), state.estimate, now_ns),
+            owed=owed,
             receipts=(),
             decided=counted(state.decided, decision.stop.value if decision.stop else "driving"),
             next_tick_ns=now_ns + self.tick_ns,

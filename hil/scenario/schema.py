@@ -47,7 +47,9 @@ class ControllerSection(_Section, frozen=True, kw_only=True):
     """The follower's law, its gains, and what the guard and the prediction assume.
 
     ``max_age_s``: oldest measurement a command may rest on. ``lag_s``, ``transport_s``: actuator lag and
-    command transport time that the prediction looks ahead by. ``command_type``: what the robot takes.
+    command transport time that the prediction looks ahead by. ``v_resolution``, ``u_resolution``: steps of
+    the robot's link, into which commands are rounded so that nothing is lost on average; 0 for a link that
+    carries any value. ``command_type``: what the robot takes.
     """
 
     law: LawName = "independent"
@@ -60,6 +62,8 @@ class ControllerSection(_Section, frozen=True, kw_only=True):
     lag_s: NonNegative = 0.1
     transport_s: NonNegative = 0.0
     tick_hz: Rate = 50.0
+    v_resolution: NonNegative = 0.0
+    u_resolution: NonNegative = 0.0
     command_type: Literal["TwistStamped", "Twist"] = "TwistStamped"
 
 

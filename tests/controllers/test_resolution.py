@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controllers.limits import Limits
+from controllers.resolution import NOTHING_OWED, Resolution
+from formation.pose import Motion
+
+LIMITS = Limits(0.22, 2.84)
+STEPS = Resolution(0.01, 0.01)
+wanted_motion = st.builds(Motion, st.floats(-0.22, 0.22), st.floats(-2.84, 2.84))
+
+
+def as_the_firmware_takes_it(value: float) -> float:
+    """Hundredths, cut off: what a TurtleBot3's link does with a command."""
+    return int(value * 100) / 100
+
+
+@given(wanted_motion)
+def test_on_average_the_robot_gets_what_was_wanted(wanted: Motion) -> None:
+    owed, got_v, got_u, count = NOTHING_OWED, 0.0, 0.0, 200
+    for _ in range(count):
+        sent, owed = STEPS.round(wanted, owed, LIMITS)
+        assert LIMITS.allow(sent)
+        assert max(abs(owed.v), abs(owed.u)) <= 0.005 + 1e-12
+        got_v, got_u = (
+            got_v + as_the_firmware_takes_it(sent.v),
+            got_u + as_the_firmware_takes_it(sent.u),
+        )
+    # What is left after any number of commands is half a step in all.
+    assert got_v / count == pytest.approx(wanted.v, abs=0.006 / count)
+    assert got_u / count == pytest.approx(wanted.u, abs=0.006 / count)
+
+
+@pytest.mark.parametrize("steps", range(-284, 285))
+def test_a_link_that_truncates_takes_whole_steps_as_they_are(steps: int) -> None:
+    sent, owed = STEPS.round(Motion(0.0, steps * 0.01), NOTHING_OWED, LIMITS)
+    assert int(sent.u * 100) == steps
+    assert abs(owed.u) < 1e-12
+
+
+@given(wanted_motion)
+def test_without_steps_commands_stay_as_they_are(wanted: Motion) -> None:
+    assert Resolution().round(wanted, NOTHING_OWED, LIMITS) == (wanted, NOTHING_OWED)
+
+
+def test_at_a_limit_nothing_piles_up() -> None:
+    limits, owed = Limits(0.225, 2.0), NOTHING_OWED
+    for _ in range(100):
+        sent, owed = STEPS.round(Motion(0.225, 0.0), owed, limits)
+        assert as_the_firmware_takes_it(sent.v) == 0.22
+    sent, _ = STEPS.round(Motion(0.1, 0.0), owed, limits)
+    assert as_the_firmware_takes_it(sent.v) in (0.1, 0.11)
+
+
+@pytest.mark.parametrize("bad", [-0.01, math.nan, math.inf])
+def test_a_step_that_is_none_is_refused(bad: float) -> None:
+    with pytest.raises(ValueError, match="expected a finite number"):
+        Resolution(v=bad)
