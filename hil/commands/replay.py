@@ -124,6 +124,7 @@ def _write(evidence: Evidence, summary: dict[str, Any], table: Path | None, out:
     if out is None:
         return
     from hil.figures.run_figures import draw_run
+    from hil.figures.shown import Shown
 
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -131,4 +132,4 @@ def _write(evidence: Evidence, summary: dict[str, Any], table: Path | None, out:
         raise UsageError(f"--out {out}: cannot be made ({error.strerror}); give another folder") from None
     write_json(summary, out / "summary.json")
     write_estimates(evaluated(evidence), out / "estimates.csv")
-    draw_run(evidence, summary, out / "replay.png")
+    draw_run(Shown.of(evidence), summary, out / "replay.png")

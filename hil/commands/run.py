@@ -135,6 +135,7 @@ def _make_whole(log_path: Path) -> None:
 def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
     """Judge the log, and leave summary and picture beside it."""
     from hil.figures.run_figures import draw_run
+    from hil.figures.shown import Shown
     from hil.judge.evidence import evidence_of_log
     from hil.judge.summary import summarise
     from hil.judge.summary_text import print_summary
@@ -143,6 +144,6 @@ def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
     evidence = evidence_of_log(read_log(log_path))
     summary = summarise(evidence)
     write_json(summary, folder / "summary.json")
-    draw_run(evidence, summary, folder / "run.png")
+    draw_run(Shown.of(evidence), summary, folder / "run.png")
     print_summary(summary)
     return summary

@@ -1,19 +1,14 @@
-"""Strokes that the panels of a run's picture share: bounds, violations, and lines with honest gaps."""
+"""Strokes that the panels of a run's picture share: bounds, bands, and marks of violations."""
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
-from estimation.bound_check import ROUNDING
 from formation.angles import FloatArray
+from hil.figures.shown import outside, with_gaps
 
 BELIEVED, LIMIT = "#2a8f4c", "#b03030"
-LONGEST_LINE = 0.5
-"""Between samples that are further apart [s] no line is drawn."""
 
 
 def draw_bounds(axes: Axes, t: FloatArray, low: FloatArray, high: FloatArray, suffix: str) -> None:
@@ -34,7 +29,7 @@ def mark_violations(
     axes: Axes, t: FloatArray, where: FloatArray, error: FloatArray, bound: FloatArray
 ) -> None:
     """Mark the samples whose error exceeds the bound, and count them in the legend."""
-    broken: NDArray[np.bool_] = np.isfinite(error) & (error > bound + ROUNDING)
+    broken = outside(error, bound)
     if np.any(broken):
         label = f"violated ({np.count_nonzero(broken)})"
         axes.plot(t[broken], where[broken], ls="none", marker="x", ms=5, mew=1.5, color=LIMIT, label=label)
@@ -44,16 +39,3 @@ def limit_to(axes: Axes, low: float, high: float) -> None:
     """Cut the axis where a quantity cannot sensibly be; what is drawn there belongs to the settling."""
     bottom, top = axes.get_ylim()
     axes.set_ylim(max(bottom, low), min(top, high))
-
-
-def with_gaps(t: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Values with NaN where the time jumps, so that no line pretends to know what lies between."""
-    holes = np.flatnonzero(np.diff(t) > LONGEST_LINE) + 1
-    return np.insert(t, holes, math.nan), np.insert(values, holes, math.nan)
-
-
-def broken_at_jumps(angle: FloatArray) -> FloatArray:
-    """Angle with NaN where it passes through pi, so that no line is drawn across the panel."""
-    broken = angle.copy()
-    broken[1:][np.abs(np.diff(angle)) > math.pi] = math.nan
-    return broken

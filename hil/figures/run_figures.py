@@ -16,10 +16,9 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from hil.figures.robot_drawing import draw_pair
-from hil.figures.run_panels import Panel, Shown, panels_for
-from hil.judge.columns import columns_of, inside
-from hil.judge.evidence import Evidence
-from hil.judge.noise_free_orbit import noise_free_orbit
+from hil.figures.run_panels import Panel, panels_for
+from hil.figures.shown import Shown
+from hil.judge.columns import inside
 
 DPI = 96
 _HEIGHT = 8.4
@@ -32,15 +31,11 @@ _COLOURS = 255
 _UNJUDGED = "#000000"
 
 
-def draw_run(evidence: Evidence, summary: Mapping[str, Any], path: Path) -> None:
+def draw_run(shown: Shown, summary: Mapping[str, Any], path: Path) -> None:
     """Write a PNG of a run or a replay; ``summary`` is what :func:`hil.judge.summary.summarise` says of it.
 
     What the evidence does not hold is left out: without truth the tracks, without commands their panels.
     """
-    columns = columns_of(evidence)
-    driven = evidence.motion_since_ns is not None
-    orbit = noise_free_orbit(evidence.scenario, columns.truth, columns.run) if driven else None
-    shown = Shown.of(evidence, columns, orbit)
     figure = _figure(shown)
     figure.suptitle(_title(summary), fontsize=11, y=1.0 - 0.1 / _HEIGHT)
     _save(figure, path)

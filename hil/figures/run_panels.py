@@ -3,72 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from estimation.bounds import Values
 from estimation.estimate import QUANTITIES
-from estimation.tracking import Status
 from formation.angles import FloatArray, wrap
 from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2
 from hil.figures.panel_strokes import (
     BELIEVED,
     LIMIT,
-    broken_at_jumps,
     draw_bounds,
     fill_band,
     limit_to,
     mark_violations,
-    with_gaps,
 )
 from hil.figures.robot_drawing import FOLLOWER
-from hil.judge.bounds import named_bounds, worst_errors
-from hil.judge.columns import Columns, EstimateColumns
-from hil.judge.evidence import Evidence
-from hil.judge.noise_free_orbit import NoiseFreeOrbit
-from hil.judge.true_states import Stamps, TrueStates
+from hil.figures.shown import Shown, broken_at_jumps, with_gaps
 
 TRUE, ORBIT = "#3c3c3c", "#7a5fa8"
 _FARTHEST = 4.0
 """A bound that is so many times out of the picture is left out: it would flatten the rest."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Shown:
-    """What the panels draw from. ``tracked``: estimates of the whole run that say TRACKING, and their truth.
-
-    ``bounds``: the named bounds at the judged samples; ``orbit``: the noise-free run, where it is known.
-    """
-
-    evidence: Evidence
-    columns: Columns
-    tracked: EstimateColumns
-    tracked_true: TrueStates
-    bounds: Mapping[str, FloatArray]
-    orbit: NoiseFreeOrbit | None
-
-    @staticmethod
-    def of(evidence: Evidence, columns: Columns, orbit: NoiseFreeOrbit | None) -> Shown:
-        """Gather what the panels need."""
-        during = columns.estimates.capture_ns <= columns.run.to_ns
-        tracked = columns.estimates.only((columns.estimates.status == Status.TRACKING) & during)
-        bounds: Mapping[str, FloatArray] = {}
-        if len(columns.samples.capture_ns):
-            bounds = named_bounds(evidence.scenario, columns, worst_errors(evidence.scenario, columns))
-        true = columns.truth.at(tracked.capture_ns)
-        return Shown(evidence, columns, tracked, true, bounds, orbit)
-
-    def seconds(self, moments_ns: Stamps) -> FloatArray:
-        """Moments as seconds of the run."""
-        return np.asarray((moments_ns - self.evidence.zero_ns) * 1e-9, dtype=np.float64)
-
-    @property
-    def drawn_bound(self) -> str:
-        """Suffix of the bounds that are drawn: the sound ones where true rates are known, else extended."""
-        return "" if np.any(np.isfinite(self.columns.true.rho_dot)) else "_extended"
 
 
 def draw_distance(axes: Axes, shown: Shown) -> None:

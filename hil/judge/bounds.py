@@ -46,16 +46,20 @@ def judge_bounds(scenario: Scenario, columns: Columns) -> dict[str, object]:
     }
     if not np.any(known):
         return result
-    spacing = Spacing(scenario.formation.rho_0, scenario.controller.mu_rho)
-    mu1 = scenario.controller.mu1
-    truth = SpeedInputs(true.rho, true.v1, true.alpha1)
-    errors = errors_of(samples.seen, truth, mu1, spacing)
+    errors = bound_errors(scenario, columns)
     bounds = named_bounds(scenario, columns, given)
     verdict = check(
         {name: error[known] for name, error in errors.items()},
         {name: bound[known] for name, bound in bounds.items()},
     )
     return result | {"violations": verdict.violations, "tightness": verdict.tightness}
+
+
+def bound_errors(scenario: Scenario, columns: Columns) -> dict[str, FloatArray]:
+    """Size of the errors of v1, alpha1 and h at every sample, NaN where the truth is not known."""
+    spacing = Spacing(scenario.formation.rho_0, scenario.controller.mu_rho)
+    truth = SpeedInputs(columns.true.rho, columns.true.v1, columns.true.alpha1)
+    return errors_of(columns.samples.seen, truth, scenario.controller.mu1, spacing)
 
 
 def named_bounds(scenario: Scenario, columns: Columns, given: WorstErrors) -> dict[str, FloatArray]:

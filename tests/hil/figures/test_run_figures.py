@@ -13,8 +13,8 @@ from PIL import Image
 
 from hil.figures.panel_strokes import LIMIT
 from hil.figures.run_figures import draw_run
-from hil.figures.run_panels import Shown, draw_alpha1_error, draw_v1, draw_v2, panels_for
-from hil.judge.columns import columns_of
+from hil.figures.run_panels import draw_alpha1_error, draw_v1, draw_v2, panels_for
+from hil.figures.shown import Shown
 from hil.judge.evidence import Evidence, evidence_of_log
 from hil.judge.summary import summarise
 from hil.log.reader import Log
@@ -30,12 +30,8 @@ def axes() -> Axes:
     return figure.add_subplot()
 
 
-def shown(evidence: Evidence) -> Shown:
-    return Shown.of(evidence, columns_of(evidence), None)
-
-
 def drawn(evidence: Evidence, path: Path) -> Image.Image:
-    draw_run(evidence, summarise(evidence), path)
+    draw_run(Shown.of(evidence), summarise(evidence), path)
     assert path.stat().st_size < LARGEST_BYTES
     with Image.open(path) as image:
         return image.convert("RGB")
@@ -91,7 +87,7 @@ def test_what_is_not_known_is_left_out(
 ) -> None:
     assert callable(lack)
     evidence = lack(exact_evidence)
-    assert tuple(map(len, panels_for(shown(evidence)))) == panels
+    assert tuple(map(len, panels_for(Shown.of(evidence)))) == panels
     assert ink(drawn(evidence, tmp_path / "run.png")) > 0.0
 
 
@@ -108,22 +104,22 @@ def test_violations_are_marked(axes: Axes, exact_evidence: Evidence) -> None:
             estimates[number], v1=estimates[number].v1 + 0.01, alpha1=estimates[number].alpha1 + 0.1
         )
     evidence = replace(exact_evidence, estimates=estimates)
-    draw_v1(axes, shown(evidence))
+    draw_v1(axes, Shown.of(evidence))
     assert marks(axes) == [3]
     assert "violated (3)" in [str(line.get_label()) for line in axes.lines]
-    draw_alpha1_error(axes, shown(evidence))
+    draw_alpha1_error(axes, Shown.of(evidence))
     assert marks(axes) == [3, 3]
 
 
 def test_no_violation_leaves_no_mark(axes: Axes, exact_evidence: Evidence) -> None:
-    draw_v1(axes, shown(exact_evidence))
-    draw_alpha1_error(axes, shown(exact_evidence))
+    draw_v1(axes, Shown.of(exact_evidence))
+    draw_alpha1_error(axes, Shown.of(exact_evidence))
     assert marks(axes) == []
 
 
 def test_no_line_is_drawn_across_a_gap(axes: Axes, exact_evidence: Evidence) -> None:
     silent = [each for k, each in enumerate(exact_evidence.estimates) if not 100 <= k < 160]
-    draw_v1(axes, shown(replace(exact_evidence, estimates=silent)))
+    draw_v1(axes, Shown.of(replace(exact_evidence, estimates=silent)))
     line = next(line for line in axes.lines if line.get_label() == "estimate")
     assert np.count_nonzero(np.isnan(np.asarray(line.get_ydata(), dtype=float))) == 1
     (band,) = axes.collections
@@ -131,7 +127,7 @@ def test_no_line_is_drawn_across_a_gap(axes: Axes, exact_evidence: Evidence) -> 
 
 
 def test_limits_of_a_command_show_where_they_matter(axes: Axes, exact_evidence: Evidence) -> None:
-    draw_v2(axes, shown(exact_evidence))
+    draw_v2(axes, Shown.of(exact_evidence))
     heights = [np.asarray(line.get_ydata(), dtype=float).tolist() for line in axes.lines]
     assert [0.22, 0.22] in heights
     assert [-0.22, -0.22] not in heights

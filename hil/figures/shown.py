@@ -1,0 +1,86 @@
+"""What pictures and reports of a run draw from: its columns with bounds, errors and the noise-free orbit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.bound_check import ROUNDING
+from estimation.tracking import Status
+from formation.angles import FloatArray
+from hil.judge.bounds import WorstErrors, bound_errors, named_bounds, worst_errors
+from hil.judge.columns import Columns, EstimateColumns, columns_of
+from hil.judge.evidence import Evidence
+from hil.judge.noise_free_orbit import NoiseFreeOrbit, noise_free_orbit
+from hil.judge.true_states import Stamps, TrueStates
+
+LONGEST_LINE = 0.5
+"""Between samples that are further apart [s] no line is drawn."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shown:
+    """What is drawn. ``tracked``: estimates of the whole run that say TRACKING, and their truth.
+
+    ``worst``: what the bounds rest on, None without judged samples; ``bounds``, ``errors``: the named bounds
+    at the judged samples, and the sizes of the errors of v1, alpha1 and h there; ``orbit``: the
+    noise-free run, where it is known.
+    """
+
+    evidence: Evidence
+    columns: Columns
+    tracked: EstimateColumns
+    tracked_true: TrueStates
+    worst: WorstErrors | None
+    bounds: Mapping[str, FloatArray]
+    errors: Mapping[str, FloatArray]
+    orbit: NoiseFreeOrbit | None
+
+    @staticmethod
+    def of(evidence: Evidence) -> Shown:
+        """Gather what is drawn of an evidence."""
+        columns = columns_of(evidence)
+        driven = evidence.motion_since_ns is not None
+        orbit = noise_free_orbit(evidence.scenario, columns.truth, columns.run) if driven else None
+        during = columns.estimates.capture_ns <= columns.run.to_ns
+        tracked = columns.estimates.only((columns.estimates.status == Status.TRACKING) & during)
+        worst: WorstErrors | None = None
+        bounds: Mapping[str, FloatArray] = {}
+        errors: Mapping[str, FloatArray] = {}
+        if len(columns.samples.capture_ns):
+            worst = worst_errors(evidence.scenario, columns)
+            bounds = named_bounds(evidence.scenario, columns, worst)
+            errors = bound_errors(evidence.scenario, columns)
+        true = columns.truth.at(tracked.capture_ns)
+        return Shown(evidence, columns, tracked, true, worst, bounds, errors, orbit)
+
+    def seconds(self, moments_ns: Stamps) -> FloatArray:
+        """Moments as seconds of the run."""
+        return np.asarray((moments_ns - self.evidence.zero_ns) * 1e-9, dtype=np.float64)
+
+    @property
+    def drawn_bound(self) -> str:
+        """Suffix of the bounds that are drawn: the sound ones where true rates are known, else extended."""
+        return "" if np.any(np.isfinite(self.columns.true.rho_dot)) else "_extended"
+
+
+def outside(error: FloatArray, bound: FloatArray) -> NDArray[np.bool_]:
+    """Samples whose error is known and exceeds its bound."""
+    return np.asarray(np.isfinite(error) & (error > bound + ROUNDING))
+
+
+def with_gaps(t: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Values with NaN where the time jumps, so that no line pretends to know what lies between."""
+    holes = np.flatnonzero(np.diff(t) > LONGEST_LINE) + 1
+    return np.insert(t, holes, math.nan), np.insert(values, holes, math.nan)
+
+
+def broken_at_jumps(angle: FloatArray) -> FloatArray:
+    """Angle with NaN where it passes through pi, so that no line is drawn across the panel."""
+    broken = angle.copy()
+    broken[1:][np.abs(np.diff(angle)) > math.pi] = math.nan
+    return broken
