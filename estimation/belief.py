@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,9 +34,10 @@ class Modes:
     probabilities: tuple[float, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Belief:
+class Belief(NamedTuple):
     """Mean (5,) and covariance (5, 5) of the state of :mod:`estimation.motion`.
+
+    A tuple, since frozen dataclasses take as long to build as a filter takes to compute.
 
     ``rates`` and ``elapsed`` (time since the last update [s]) are kept by estimators that difference,
     ``memory`` by those that know more than mean and covariance say.

@@ -9,12 +9,13 @@ import numpy as np
 from estimation.belief import Belief, Model, Rates
 from estimation.measurement import FrontEnd, Measurement
 from estimation.motion import FollowerMotion, Matrix, Vector
+from estimation.tracking import Estimator
 from formation.angles import wrap
 from formation.pose import Motion
 from formation.shape import leader_velocity, polar_velocity
 
 
-class DifferenceEstimator:
+class DifferenceEstimator(Estimator):
     """Rates by differences through a first-order low-pass of time constant ``cutoff`` [s].
 
     rho_dot and alpha2_dot give X and Y of the paper, these give w; u1 is the low-passed turn of w. The

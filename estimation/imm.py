@@ -24,7 +24,7 @@ TURN_BANDWIDTHS = (0.03, 0.5)
 _LEAST_PROBABILITY = 1e-6  # a mode never dies out, so that it can come back
 
 
-class InteractingModels:
+class InteractingModels(Estimator):
     """One filter for each turn-rate bandwidth; the belief is their mixture, matched in its two moments.
 
     ``make_filter`` builds the filter of a mode. ``sojourn`` [s]: mean time that a leader stays in a mode.

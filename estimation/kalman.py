@@ -8,6 +8,7 @@ from filterpy.kalman import ExtendedKalmanFilter, MerweScaledSigmaPoints, Unscen
 from estimation.belief import Belief, Model
 from estimation.measurement import Measurement
 from estimation.motion import STATE_SIZE, FollowerMotion, Matrix, Vector
+from estimation.tracking import Estimator
 
 _POSITION = np.eye(2, STATE_SIZE)
 
@@ -21,7 +22,7 @@ class _Carrier(ExtendedKalmanFilter):  # type: ignore[misc]
         self.x = self.moved
 
 
-class ExtendedFilter:
+class ExtendedFilter(Estimator):
     """First-order filter: the covariance moves by the Jacobian of the motion at the mean."""
 
     def __init__(self, model: Model) -> None:
@@ -50,7 +51,7 @@ class ExtendedFilter:
         return Belief(carrier.x, _symmetric(carrier.P))
 
 
-class UnscentedFilter:
+class UnscentedFilter(Estimator):
     """Sigma-point filter: ten points carry mean and covariance through the exact motion.
 
     With alpha = 1, beta = 0, kappa = 0 the centre has no weight and the others are equal: the cubature rule,

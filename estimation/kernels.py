@@ -6,7 +6,8 @@ file of a kernel only: what it called from elsewhere could change unnoticed. Imp
 the kernels for their one signature, or loads them from the cache.
 
 Each kernel leaves its arguments alone and fills the mean ``after`` (5,) and the covariance ``joint`` (5, 5),
-which may share no memory with them: handing back new arrays would cost more than the arithmetic does.
+which may share no memory with them: handing back new arrays would cost more than the arithmetic does. Only
+:func:`update` may be given the same arrays for both.
 
 A rotation or a turn integral is a 2x2 matrix [[a, -b], [b, a]] and is written as its pair (a, b).
 """
@@ -47,6 +48,7 @@ _PREDICT = (
     *_RESULT,
 )
 _UPDATE = (_ANY_VECTOR, _ANY_MATRIX, _ANY_VECTOR, _ANY_MATRIX, *_RESULT)
+_STEP = (*_PREDICT[:-2], _ANY_VECTOR, _ANY_MATRIX, types.float64, *_RESULT)
 
 
 def _compiled(*signature: object) -> Callable[[_F], _F]:
@@ -64,15 +66,16 @@ def _times(a: Pair, b: Pair) -> Pair:
 @_compiled()
 def _swing(u: float, dt: float) -> Swing:
     a = u * dt
-    sin_a, cos_a = math.sin(a), math.cos(a)
     if abs(a) < _SMALL_TURN:
         return (
-            (cos_a, sin_a),
+            (1.0 - a * a * (0.5 - a * a / 24.0), a * (1.0 - a * a * (1.0 / 6.0 - a * a / 120.0))),
             (dt * (1.0 - a * a / 6.0), dt * (a / 2.0 - a * a * a / 24.0)),
             (dt * dt * (-a / 3.0 + a * a * a / 30.0), dt * dt * (0.5 - a * a / 8.0)),
         )
     half = math.sin(0.5 * a)
-    s, c = sin_a / u, 2.0 * half * half / u
+    sin_a, versed = 2.0 * half * math.cos(0.5 * a), 2.0 * half * half
+    cos_a = 1.0 - versed
+    s, c = sin_a / u, versed / u
     return (cos_a, sin_a), (s, c), ((dt * cos_a - s) / u, (dt * sin_a - c) / u)
 
 
@@ -259,24 +262,35 @@ def unscented_predict(
     _mirror(joint)
 
 
+@_compiled()
+def _weighed(x: float, y: float, a: float, b: float, c: float) -> Pair:
+    """Multiply a row by the symmetric [[a, b], [b, c]]."""
+    return x * a + y * b, x * b + y * c
+
+
 @_compiled(*_UPDATE)
 def update(
     mean: Vector, covariance: Matrix, position: Vector, spread: Matrix, after: Vector, joint: Matrix
 ) -> None:
     """Take in that the leader was seen at ``position`` (2,) with covariance ``spread`` (2, 2).
 
-    Joseph form. As the position is part of the state, sigma points would give the same gain.
+    Joseph form. As the position is part of the state, sigma points would give the same gain. Every element
+    is read before it is written, so that ``after`` and ``joint`` may be ``mean`` and ``covariance``.
     """
     ra, rb, rc = spread[0, 0], spread[0, 1], spread[1, 1]
     a, b, c = covariance[0, 0] + ra, covariance[0, 1] + rb, covariance[1, 1] + rc
     det = a * c - b * b
     ia, ib, ic = c / det, -b / det, a / det
     x, y = position[0] - mean[0], position[1] - mean[1]
-    gain = np.empty((_SIZE, 2))
+    gain = (
+        _weighed(covariance[0, 0], covariance[0, 1], ia, ib, ic),
+        _weighed(covariance[1, 0], covariance[1, 1], ia, ib, ic),
+        _weighed(covariance[2, 0], covariance[2, 1], ia, ib, ic),
+        _weighed(covariance[3, 0], covariance[3, 1], ia, ib, ic),
+        _weighed(covariance[4, 0], covariance[4, 1], ia, ib, ic),
+    )
     for i in range(_SIZE):
-        gain[i, 0] = covariance[i, 0] * ia + covariance[i, 1] * ib
-        gain[i, 1] = covariance[i, 0] * ib + covariance[i, 1] * ic
-        after[i] = mean[i] + gain[i, 0] * x + gain[i, 1] * y
+        after[i] = mean[i] + gain[i][0] * x + gain[i][1] * y
     # What is left of the position, 1 - K, as R / S: a difference of two near ones would lose its digits.
     left = ((ra * ia + rb * ib, ra * ib + rb * ic), (rb * ia + rc * ib, rb * ib + rc * ic))
     for j in range(_SIZE):
@@ -284,14 +298,74 @@ def update(
         joint[0, j] = left[0][0] * first + left[0][1] * second
         joint[1, j] = left[1][0] * first + left[1][1] * second
         for i in range(2, _SIZE):
-            joint[i, j] = covariance[i, j] - gain[i, 0] * first - gain[i, 1] * second
+            joint[i, j] = covariance[i, j] - gain[i][0] * first - gain[i][1] * second
     for i in range(_SIZE):
         first, second = joint[i, 0], joint[i, 1]
         joint[i, 0] = first * left[0][0] + second * left[0][1]
         joint[i, 1] = first * left[1][0] + second * left[1][1]
         for j in range(2, _SIZE):
-            joint[i, j] -= first * gain[j, 0] + second * gain[j, 1]
-        by_x, by_y = gain[i, 0] * ra + gain[i, 1] * rb, gain[i, 0] * rb + gain[i, 1] * rc
+            joint[i, j] -= first * gain[j][0] + second * gain[j][1]
+        by_x, by_y = gain[i][0] * ra + gain[i][1] * rb, gain[i][0] * rb + gain[i][1] * rc
         for j in range(_SIZE):
-            joint[i, j] += by_x * gain[j, 0] + by_y * gain[j, 1]
+            joint[i, j] += by_x * gain[j][0] + by_y * gain[j][1]
     _mirror(joint)
+
+
+@_compiled()
+def _gated_update(mean: Vector, covariance: Matrix, position: Vector, spread: Matrix, gate: float) -> float:
+    """Take a measurement into mean and covariance themselves if its NIS is within the gate; the NIS."""
+    a, b, c = (
+        covariance[0, 0] + spread[0, 0],
+        covariance[0, 1] + spread[0, 1],
+        covariance[1, 1] + spread[1, 1],
+    )
+    x, y = position[0] - mean[0], position[1] - mean[1]
+    nis: float = (c * x * x - 2.0 * b * x * y + a * y * y) / (a * c - b * b)
+    if nis <= gate:
+        update(mean, covariance, position, spread, mean, covariance)
+    return nis
+
+
+@_compiled(*_STEP)
+def extended_step(
+    mean: Vector,
+    covariance: Matrix,
+    dt: float,
+    v2: float,
+    u2: float,
+    sd_v2: float,
+    sd_u2: float,
+    noise: Vector,
+    position: Vector,
+    spread: Matrix,
+    gate: float,
+    after: Vector,
+    joint: Matrix,
+) -> float:
+    """:func:`extended_predict`, gate and :func:`update` in one call; the measurement's NIS.
+
+    A measurement whose NIS is above ``gate``, or is not a number, leaves the prediction as it is.
+    """
+    extended_predict(mean, covariance, dt, v2, u2, sd_v2, sd_u2, noise, after, joint)
+    return _gated_update(after, joint, position, spread, gate)
+
+
+@_compiled(*_STEP)
+def unscented_step(
+    mean: Vector,
+    covariance: Matrix,
+    dt: float,
+    v2: float,
+    u2: float,
+    sd_v2: float,
+    sd_u2: float,
+    noise: Vector,
+    position: Vector,
+    spread: Matrix,
+    gate: float,
+    after: Vector,
+    joint: Matrix,
+) -> float:
+    """:func:`unscented_predict`, gate and :func:`update` in one call, as :func:`extended_step`."""
+    unscented_predict(mean, covariance, dt, v2, u2, sd_v2, sd_u2, noise, after, joint)
+    return _gated_update(after, joint, position, spread, gate)

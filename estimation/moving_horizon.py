@@ -19,12 +19,13 @@ from estimation.belief import Belief, Model
 from estimation.measurement import Measurement
 from estimation.memory import Horizon, Stage
 from estimation.motion import STATE_SIZE, FollowerMotion, Matrix, Vector
+from estimation.tracking import Estimator
 
 _AT_ONCE = FollowerMotion(0.0, 0.0, 0.0, 0.0)
 _NO_DRIVE = np.zeros((STATE_SIZE, STATE_SIZE))
 
 
-class MovingHorizon:
+class MovingHorizon(Estimator):
     """Gauss-Newton over the last ``window`` measurements, ``iterations`` steps for each new one.
 
     When the window is full its oldest measurement is absorbed by the arrival cost, linearised where the
@@ -40,7 +41,7 @@ class MovingHorizon:
         """Belief from the first measurement alone, which is the arrival cost of the first window."""
         base = self.model.start(measurement)
         stage = Stage(0.0, _AT_ONCE, _NO_DRIVE, base.mean)
-        return replace(base, memory=Horizon(base.mean, base.covariance, (stage,)))
+        return base._replace(memory=Horizon(base.mean, base.covariance, (stage,)))
 
     def predict(self, belief: Belief, dt: float, follower: FollowerMotion) -> Belief:
         """Belief after dt [s], the follower having moved as given."""

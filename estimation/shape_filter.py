@@ -13,6 +13,7 @@ from estimation.measurement import FrontEnd, Measurement
 from estimation.memory import Guess, ShapeState
 from estimation.motion import FollowerMotion, Matrix, Vector
 from estimation.shape_motion import cartesian, drive_through, range_and_bearing
+from estimation.tracking import Estimator
 from formation.angles import wrap
 from formation.pose import Pose, advance
 
@@ -21,7 +22,7 @@ _OLDEST_ANCHOR = 0.5  # seconds after which a guess begins anew: a leader that s
 _SEEN = np.eye(5)[[0, 2]]
 
 
-class ShapeFilter:
+class ShapeFilter(Estimator):
     """Five-state EKF on Eq. (3) of the paper; range and bearing are measured, in both front ends.
 
     Its equations divide by rho and know no direction where v1 is zero: it is singular at rho = 0 and v1 = 0,
@@ -39,7 +40,7 @@ class ShapeFilter:
     def start(self, measurement: Measurement) -> Belief:
         """Belief from the first measurement alone, the anchor of the first guess."""
         base = self.model.start(measurement)
-        return replace(base, memory=Guess(measurement.position, measurement.covariance))
+        return base._replace(memory=Guess(measurement.position, measurement.covariance))
 
     def predict(self, belief: Belief, dt: float, follower: FollowerMotion) -> Belief:
         """Belief after dt [s], the follower having moved as given."""
@@ -73,7 +74,7 @@ class ShapeFilter:
         if known and guess.samples >= 3:
             return _reported(_shape_of_guess(found, measurement))
         if guess.elapsed > _OLDEST_ANCHOR:
-            return replace(found, memory=Guess(measurement.position, measurement.covariance))
+            return found._replace(memory=Guess(measurement.position, measurement.covariance))
         return found
 
     def _guessed(self, guess: Guess, measurement: Measurement) -> Belief:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import bisect
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import Protocol
 
@@ -46,7 +46,10 @@ class Verdict(Enum):
 
 
 class Estimator(Protocol):
-    """A recursive estimator: pure, its whole state is the belief."""
+    """A recursive estimator: pure, its whole state is the belief.
+
+    Those that derive from it have ``step`` out of their ``predict`` and ``update``.
+    """
 
     model: Model
 
@@ -58,6 +61,17 @@ class Estimator(Protocol):
 
     def update(self, belief: Belief, measurement: Measurement) -> Belief:
         """Belief after a measurement at the belief's time."""
+
+    def step(
+        self, belief: Belief, dt: float, follower: FollowerMotion, measurement: Measurement, gate: float
+    ) -> tuple[Belief, float]:
+        """Belief after dt [s] and a measurement at the end of it, and the NIS of this measurement.
+
+        One whose NIS is above ``gate`` is left out: the belief is then the prediction.
+        """
+        prior = self.predict(belief, dt, follower)
+        nis = innovation(prior, measurement).nis
+        return (self.update(prior, measurement) if nis <= gate else prior), nis
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,12 +163,9 @@ class Tracker:
         dt = (measurement.capture_ns - last.measurement.capture_ns) * _NS
         if (measurement.capture_ns - last.used_ns) * _NS > self.settings.lost_after:
             return self.begin(measurement)
-        prior = self.estimator.predict(
-            last.belief, dt, mean_motion(last.measurement.motion, measurement.motion)
-        )
-        nis = innovation(prior, measurement).nis
+        follower = mean_motion(last.measurement.motion, measurement.motion)
+        belief, nis = self.estimator.step(last.belief, dt, follower, measurement, self._gate)
         if nis <= self._gate:
-            belief = self.estimator.update(prior, measurement)
             settled = self.settled(belief, last.settled)
             return TrackPoint(measurement, belief, Verdict.USED, nis, measurement.capture_ns, settled)
         candidate = self._nurse(last.candidate, measurement)
@@ -163,8 +174,8 @@ class Tracker:
             return TrackPoint(
                 measurement, candidate.belief, Verdict.RESTARTED, nis, measurement.capture_ns, settled
             )
-        settled = self.settled(prior, last.settled)
-        return TrackPoint(measurement, prior, Verdict.GATED, nis, last.used_ns, settled, candidate)
+        settled = self.settled(belief, last.settled)
+        return TrackPoint(measurement, belief, Verdict.GATED, nis, last.used_ns, settled, candidate)
 
     def status(self, track: Track, now_ns: int) -> Status:
         """Status of the track's newest point for one who looks at it at ``now_ns``."""
@@ -185,9 +196,8 @@ class Tracker:
         if candidate is not None:
             dt = (measurement.capture_ns - candidate.capture_ns) * _NS
             follower = mean_motion(candidate.motion, measurement.motion)
-            prior = self.estimator.predict(candidate.belief, dt, follower)
-            if innovation(prior, measurement).nis <= self._gate:
-                belief = self.estimator.update(prior, measurement)
+            belief, nis = self.estimator.step(candidate.belief, dt, follower, measurement, self._gate)
+            if nis <= self._gate:
                 return Candidate(belief, measurement.capture_ns, measurement.motion, candidate.frames + 1)
         return Candidate(self.estimator.start(measurement), measurement.capture_ns, measurement.motion, 1)
 
@@ -210,4 +220,4 @@ class Tracker:
 
 def mean_motion(a: FollowerMotion, b: FollowerMotion) -> FollowerMotion:
     """Mean motion over an interval, from the motions at its ends (trapezoid)."""
-    return replace(b, v2=0.5 * (a.v2 + b.v2), u2=0.5 * (a.u2 + b.u2))
+    return FollowerMotion(0.5 * (a.v2 + b.v2), 0.5 * (a.u2 + b.u2), b.sd_v2, b.sd_u2)

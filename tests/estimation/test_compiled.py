@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimation import kernels
-from estimation.belief import Belief, Model
+from estimation.belief import Belief, Model, innovation
 from estimation.compiled import CompiledExtended, CompiledUnscented
 from estimation.kalman import ExtendedFilter, UnscentedFilter
 from estimation.measurement import FrontEnd, Measurement
@@ -109,6 +110,23 @@ def test_a_whole_track_is_filterpys(pair: tuple[Estimator, Estimator], rate: flo
         assert_same(found, wanted)
 
 
+@pytest.mark.parametrize("pair", PAIRS, ids=IDS)
+@given(belief=beliefs(), dt=durations, measurement=measurements(), share=st.floats(0.5, 2.0))
+@settings(max_examples=50)
+def test_a_step_is_a_prediction_a_gate_and_an_update(
+    pair: tuple[Estimator, Estimator], belief: Belief, dt: float, measurement: Measurement, share: float
+) -> None:
+    compiled, follower = pair[0], measurement.motion
+    prior = compiled.predict(belief, dt, follower)
+    nis = innovation(prior, measurement).nis
+    gate = share * nis
+    found, told = compiled.step(belief, dt, follower, measurement, gate)
+    assert told == pytest.approx(nis, rel=1e-9)
+    wanted = compiled.update(prior, measurement) if told <= gate else prior
+    assert np.array_equal(found.mean, wanted.mean)
+    assert np.array_equal(found.covariance, wanted.covariance)
+
+
 def seen(generator: np.random.Generator, at: float, follower: FollowerMotion) -> Measurement:
     """A leader on a circle, seen with noise."""
     position = 0.2 * np.array([np.cos(0.5 * at), np.sin(0.5 * at)]) + 1e-3 * generator.standard_normal(2)
@@ -128,6 +146,10 @@ def test_the_layout_of_what_is_given_does_not_matter(estimator: Estimator) -> No
     for found, wanted in (
         (estimator.predict(odd, 0.1, follower), estimator.predict(plain, 0.1, follower)),
         (estimator.update(odd, other), estimator.update(plain, measurement)),
+        (
+            estimator.step(odd, 0.1, follower, other, math.inf)[0],
+            estimator.step(plain, 0.1, follower, measurement, math.inf)[0],
+        ),
     ):
         assert np.array_equal(found.mean, wanted.mean)
         assert np.array_equal(found.covariance, wanted.covariance)
@@ -154,8 +176,16 @@ def test_a_direction_without_variance_breaks_nothing() -> None:
 
 
 def test_no_call_ever_waits_for_the_compiler() -> None:
-    every: list[Any] = [kernels.extended_predict, kernels.unscented_predict, kernels.update]
+    every: list[Any] = [
+        kernels.extended_predict,
+        kernels.unscented_predict,
+        kernels.update,
+        kernels.extended_step,
+        kernels.unscented_step,
+    ]
     estimator = CompiledUnscented(WORLD)
     prior = estimator.predict(estimator.start(seen(np.random.default_rng(1), 0.0, STILL)), 1, STILL)
-    estimator.update(prior, Measurement(0, strided(np.ones(2)), fortran(np.eye(2)), STILL))
-    assert [len(kernel.signatures) for kernel in every] == [1, 1, 1]
+    odd = Measurement(0, strided(np.ones(2)), fortran(np.eye(2)), STILL)
+    estimator.update(prior, odd)
+    estimator.step(prior, 1, STILL, odd, 18)
+    assert [len(kernel.signatures) for kernel in every] == [1] * 5
