@@ -13,12 +13,11 @@ from enum import IntEnum
 
 import numpy as np
 
-from formation.angles import wrap
+from formation.angles import FloatArray, wrap
 from formation.pose import Motion, Pose
 
 _FULL_NOISE_SPEED = 0.05
 _FULL_NOISE_TURN = 0.2
-_BLOCK = 64
 
 
 class Stream(IntEnum):
@@ -27,6 +26,10 @@ class Stream(IntEnum):
     MOCAP = 0
     LEADER_ODOMETRY = 1
     FOLLOWER_ODOMETRY = 2
+
+
+BLOCK = {Stream.MOCAP: 4096, Stream.LEADER_ODOMETRY: 1024, Stream.FOLLOWER_ODOMETRY: 1024}
+"""Items of a stream drawn at once: about what half a minute has, as a generator is slow to set up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,25 +62,28 @@ class Draw:
 
 def normals(seed: int, stream: Stream, index: int, count: int) -> tuple[float, ...]:
     """``count`` standard normals for the ``index``-th item of a stream."""
-    return _block(seed, stream, index // _BLOCK, count)[0][index % _BLOCK]
+    block, row = divmod(index, BLOCK[stream])
+    return tuple(_kept(seed, stream, block, count)[0][row].tolist())
 
 
 def draw_frame(seed: int, index: int, delivery: Delivery) -> Draw:
     """Random numbers of a mocap frame."""
-    rows, shares = _block(seed, Stream.MOCAP, index // _BLOCK, 6)
-    normal, (late, lost) = rows[index % _BLOCK], shares[index % _BLOCK]
+    block, row = divmod(index, BLOCK[Stream.MOCAP])
+    rows, shares = _kept(seed, Stream.MOCAP, block, 6)
+    normal, (late, lost) = tuple(rows[row].tolist()), shares[row].tolist()
     delay = delivery.latency - delivery.jitter * math.log1p(-late)
     return Draw(normal[:3], normal[3:], delay, lost < delivery.loss)
 
 
-@functools.lru_cache(maxsize=16)
-def _block(
-    seed: int, stream: Stream, block: int, count: int
-) -> tuple[list[tuple[float, ...]], list[tuple[float, ...]]]:
-    """Normals (_BLOCK, count) and uniforms (_BLOCK, 2) of a block; a generator is slow to set up."""
+def draw_block(seed: int, stream: Stream, block: int, count: int) -> tuple[FloatArray, FloatArray]:
+    """Normals (n, count) of the n = ``BLOCK[stream]`` items of a block, and for frames uniforms (n, 2)."""
     random = np.random.Generator(np.random.Philox(key=[seed, int(stream)], counter=[0, 0, 0, block]))
-    normal = random.standard_normal((_BLOCK, count)).tolist()
-    return list(map(tuple, normal)), list(map(tuple, random.random((_BLOCK, 2)).tolist()))
+    n = BLOCK[stream]
+    normal = random.standard_normal((n, count))
+    return normal, random.random((n if stream is Stream.MOCAP else 0, 2))
+
+
+_kept = functools.lru_cache(maxsize=16)(draw_block)
 
 
 def observe(pose: Pose, motion: Motion, noise: MocapNoise, normal: tuple[float, ...]) -> Pose:
