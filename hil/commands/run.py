@@ -11,7 +11,7 @@ import click
 
 from hil.errors import CheckFailedError, UsageError
 from hil.report_json import print_json, write_json
-from hil.scenario.files import load_scenario, refuse_offline
+from hil.scenario.files import load_scenario, refuse_unrunnable
 from hil.scenario.schema import Scenario
 
 DURATION = click.FloatRange(min=0, min_open=True)
@@ -50,7 +50,7 @@ def command(
     given = {"run.duration_s": duration, "run.seed": seed, "estimator.kind": estimator, "controller.law": law}
     options = [f"{key}={value}" for key, value in given.items() if value is not None]
     chosen = load_scenario(scenario, [*overrides, *options])
-    refuse_offline(chosen)
+    refuse_unrunnable(chosen)
     folder = _folder(chosen, out)
     log_path = folder / "run.mcap"
     if log_path.exists():

@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+import msgspec
 
 from hil.report_json import print_json
 from hil.scenario.files import load_scenario
+from hil.scenario.schema import Scenario
 
 
 @click.command("simulate")
@@ -25,15 +27,16 @@ def command(
     overrides: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Integrate SCENARIO without noise, delay or limits, as the paper does, and report on it."""
-    from hil.simulation import simulate
+    """Integrate SCENARIO without noise or delay, as the paper does, and report on it.
 
+    A pair drives without limits, a chain of agents within them.
+    """
     chosen = [*overrides]
     if law is not None:
         chosen.append(f"controller.law={law}")
     if duration is not None:
         chosen.append(f"run.duration_s={duration}")
-    result = simulate(load_scenario(scenario, chosen), out)
+    result = _simulate(load_scenario(scenario, chosen), out)
     if as_json:
         print_json(result)
         return
@@ -41,3 +44,13 @@ def command(
         click.echo(f"{key}: {value}", err=True)
     if out is not None:
         click.echo(f"pictures and trajectory.csv are in {out}", err=True)
+
+
+def _simulate(scenario: Scenario, out: Path | None) -> dict[str, object]:
+    if isinstance(scenario.chain, msgspec.UnsetType):
+        from hil.simulation import simulate
+
+        return simulate(scenario, out)
+    from hil.chain_simulation import simulate_chain_of
+
+    return simulate_chain_of(scenario, scenario.chain.agents, out)

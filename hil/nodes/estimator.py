@@ -43,7 +43,7 @@ from hil.nodes.node import (
     no_counts,
     outgoing,
 )
-from hil.scenario.files import refuse_offline
+from hil.scenario.files import refuse_unrunnable
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.estimate_message import AssumedErrors, to_message
@@ -91,7 +91,7 @@ class EstimatorNode:
     name = NAME
 
     def __init__(self, scenario: Scenario) -> None:
-        refuse_offline(scenario)
+        refuse_unrunnable(scenario)
         given, leader = scenario.estimator, scenario.leader
         self.scenario = scenario
         self.topics = topics_of(scenario)

@@ -44,13 +44,21 @@ def build_scenario(
     return checked(merged, Scenario, source)
 
 
-def refuse_offline(scenario: Scenario) -> None:
-    """Raise :class:`UsageError` if the scenario asks for an estimator that needs to know the future."""
+def refuse_unrunnable(scenario: Scenario) -> None:
+    """Raise :class:`UsageError` if the scenario can be simulated or replayed only, not driven.
+
+    That is one with an estimator that needs to know the future, or with a chain of agents.
+    """
     kind = scenario.estimator.kind
     if kind in OFFLINE_ESTIMATORS:
         raise UsageError(
             f"estimator.kind is {kind!r}: it needs a whole log; run with another one, then "
             f"abreast replay LOG --estimator {kind}"
+        )
+    if not isinstance(scenario.chain, msgspec.UnsetType):
+        raise UsageError(
+            f"scenario {scenario.name}: it has a [chain] of {scenario.chain.agents} agents, expected a pair; "
+            f"abreast simulate {scenario.name} runs the chain"
         )
 
 

@@ -6,6 +6,7 @@ one place) is answered here, with a :class:`~hil.errors.UsageError` that names t
 
 from __future__ import annotations
 
+from controllers.chain import ChainTrajectory, simulate_chain
 from controllers.laws import LAWS, Gains
 from controllers.limits import Limits
 from formation.angles import FloatArray
@@ -36,7 +37,8 @@ def leader_program(scenario: Scenario) -> LeaderProgram:
 def gains(scenario: Scenario) -> Gains:
     """Gains of the follower's law, its spacing functions included."""
     given = scenario.controller
-    return Gains(given.mu1, given.mu2, Spacing(scenario.formation.rho_0, given.mu_rho))
+    spacing = Spacing(scenario.formation.rho_0, given.mu_rho)
+    return Gains(given.mu1, given.mu2, spacing, tilt=given.tilt)
 
 
 def limits(scenario: Scenario) -> Limits:
@@ -76,3 +78,21 @@ def noise_free_run(scenario: Scenario, times: FloatArray) -> Trajectory:
     Raises :class:`~formation.closed_loop.IntegrationError` if the motion breaks down.
     """
     return simulate_pair(*start_poses(scenario), leader_program(scenario), follower_law(scenario), times)
+
+
+def chain_run(scenario: Scenario, agents: int, times: FloatArray) -> ChainTrajectory:
+    """Trajectory of a chain of agents within the limits, at the given times [s] from its start.
+
+    The first two start where leader and follower do, each further one in the same shape to its predecessor.
+    Raises :class:`~formation.closed_loop.IntegrationError` if the motion breaks down.
+    """
+    leader, _ = start_poses(scenario)
+    return simulate_chain(
+        leader,
+        [start_shape(scenario)] * (agents - 1),
+        leader_program(scenario),
+        gains(scenario),
+        limits(scenario),
+        times,
+        knows_turn=scenario.controller.law == "ideal",
+    )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, get_args
 
-from msgspec import Meta, Struct
+from msgspec import UNSET, Meta, Struct, UnsetType
 
 Positive = Annotated[float, Meta(gt=0.0)]
 Rate = Annotated[float, Meta(ge=0.01, le=10_000.0)]
@@ -50,12 +50,14 @@ class ControllerSection(_Section, frozen=True, kw_only=True):
     command transport time that the prediction looks ahead by. ``v_resolution``, ``u_resolution``: steps of
     the robot's link, into which commands are rounded so that nothing is lost on average; 0 for a link that
     carries any value. ``command_type``: what the robot takes.
+    ``tilt``: how far [rad] a follower that a speed limit holds back may turn off its bearing to close in.
     """
 
     law: LawName = "independent"
     mu1: Positive
     mu2: Positive
     mu_rho: Positive
+    tilt: Annotated[float, Meta(ge=0.0, lt=1.57)] = 0.0
     v_max: Positive = 0.22
     u_max: Positive = 2.84
     max_age_s: Positive = 0.2
@@ -178,6 +180,16 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     difference_cutoff_s: Positive = 0.1
 
 
+class ChainSection(_Section, frozen=True, kw_only=True):
+    """A chain of agents: each follows the one before it, within the controller's limits.
+
+    The leader is the first agent and the follower the second. Every further agent starts in the same shape
+    to its predecessor as the second to the first, and keeps to the same law, gains and limits.
+    """
+
+    agents: Annotated[int, Meta(ge=2, le=1000)]
+
+
 class Scenario(_Section, frozen=True, kw_only=True):
     """A whole experiment. Build it with :func:`hil.scenario.files.load_scenario`."""
 
@@ -191,3 +203,4 @@ class Scenario(_Section, frozen=True, kw_only=True):
     robot: RobotSection = RobotSection()
     mocap: MocapSection = MocapSection()
     estimator: EstimatorSection = EstimatorSection()
+    chain: ChainSection | UnsetType = UNSET

@@ -1,0 +1,116 @@
+"""A chain of agents in which each follows the one before it by one law, within limits, and without noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from controllers import chain_kernels as kernels
+from controllers.laws import Gains
+from controllers.limits import Limits
+from formation.angles import FloatArray, wrap
+from formation.closed_loop import IntegrationError
+from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
+from formation.pose import Pose
+from formation.shape import Shape
+
+RELATIVE_TOLERANCE = 1e-9
+ABSOLUTE_TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChainTrajectory:
+    """A chain over time, one row per time in ``t`` (n,).
+
+    Pairs, shape (n, N-1), column k for agents k and k+1 (from 0): ``rho``, ``alpha1``, ``alpha2`` (wrapped).
+    Agents, shape (n, N): ``wanted``, the speed that the law asked for, ``v`` and ``u``, the motion within the
+    limits; ``poses`` of shape (n, N, 3) with columns x, y, theta (wrapped) in the world frame. The first
+    agent drives its program, which no limit touches.
+    """
+
+    t: FloatArray
+    rho: FloatArray
+    alpha1: FloatArray
+    alpha2: FloatArray
+    wanted: FloatArray
+    v: FloatArray
+    u: FloatArray
+    poses: FloatArray
+
+
+def simulate_chain(
+    first: Pose,
+    shapes: Sequence[Shape],
+    program: LeaderProgram,
+    gains: Gains,
+    limits: Limits,
+    times: FloatArray,
+    *,
+    knows_turn: bool,
+    relative: float = RELATIVE_TOLERANCE,
+    absolute: float = ABSOLUTE_TOLERANCE,
+) -> ChainTrajectory:
+    """Trajectory of the first agent and one follower per shape, at the given increasing times [s].
+
+    Each follower is told the true speed and shape of its predecessor, and with ``knows_turn`` its turn rate:
+    law ``ideal``, otherwise ``independent``. Eq. (3) of the paper for every pair by Dormand and Prince's
+    5(4) with the given tolerances on (ln rho, alpha1, alpha2). Raises
+    :class:`~formation.closed_loop.IntegrationError` if the motion breaks down, :class:`ValueError` if there
+    is no pair, if fewer than two times are given or if the program is of no known kind.
+    """
+    if not shapes:
+        raise ValueError("a chain needs at least one pair")
+    if len(times) < 2 or not np.all(np.diff(times) > 0.0):
+        raise ValueError("a trajectory needs at least two times, in increasing order")
+    kind, numbers = _encoded(program)
+    start = [number for shape in shapes for number in (math.log(shape.rho), shape.alpha1, shape.alpha2)]
+    state = np.array([*start, first.x, first.y, first.theta])
+    states = np.empty((len(times), len(state)))
+    motions = np.empty((len(times), 3, len(shapes) + 1))
+    moments = np.ascontiguousarray(times, dtype=np.float64)
+    setting = _setting(gains, limits, knows_turn=knows_turn)
+    step = program.longest_step
+    done = kernels.integrate(
+        moments, relative, absolute, step, state, setting, kind, numbers, states, motions
+    )
+    if not done or not np.all(np.isfinite(states)):
+        raise IntegrationError("the motion of the chain breaks down before its end")
+    return _tabulate(times, states, motions)
+
+
+def _setting(gains: Gains, limits: Limits, *, knows_turn: bool) -> FloatArray:
+    spacing, station = gains.spacing, gains.station
+    of_law = (gains.mu1, gains.mu2, spacing.rho_0, spacing.mu_rho)
+    of_limits = (limits.v_max, limits.u_max, gains.tilt)
+    return np.array([*of_law, *of_limits, station.cos, station.sin, float(knows_turn)])
+
+
+def _encoded(program: LeaderProgram) -> tuple[int, FloatArray]:
+    match program:
+        case Constant(v, u):
+            return kernels.CONSTANT, np.array([[v, u]])
+        case Sinusoid(v, u_mean, u_amplitude, omega):
+            return kernels.SINUSOID, np.array([[v, u_mean, u_amplitude, omega]])
+        case Impulse(v, u_amplitude, t_centre, t_width):
+            return kernels.IMPULSE, np.array([[v, u_amplitude, t_centre, t_width]])
+        case Table(t, v, u):
+            return kernels.TABLE, np.array([t, v, u], dtype=np.float64)
+    raise ValueError(f"{type(program).__name__} is no kind of program that a chain can be given")
+
+
+def _tabulate(times: FloatArray, states: FloatArray, motions: FloatArray) -> ChainTrajectory:
+    pairs = states[:, :-3].reshape(len(times), -1, 3)
+    rho, alpha1, alpha2 = np.exp(pairs[:, :, 0]), wrap(pairs[:, :, 1]), wrap(pairs[:, :, 2])
+    poses = np.empty((len(times), motions.shape[2], 3))
+    poses[:, 0] = states[:, -3:]
+    for pair in range(rho.shape[1]):
+        line = poses[:, pair, 2] + alpha1[:, pair]
+        poses[:, pair + 1, 0] = poses[:, pair, 0] + rho[:, pair] * np.cos(line)
+        poses[:, pair + 1, 1] = poses[:, pair, 1] + rho[:, pair] * np.sin(line)
+        poses[:, pair + 1, 2] = line + math.pi - alpha2[:, pair]
+    poses[:, :, 2] = wrap(poses[:, :, 2])
+    wanted, v, u = (motions[:, row] for row in range(3))
+    return ChainTrajectory(times, rho, alpha1, alpha2, wanted, v, u, poses)
