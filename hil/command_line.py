@@ -16,6 +16,7 @@ COMMANDS = {
     "replay": "run a log through the same steps: verify it, re-estimate it, judge it",
     "simulate": "the noise-free experiments of the paper, with pictures",
     "import": "turn other recordings into logs",
+    "calibrate": "find the offsets of a range and bearing sensor that mocap has watched",
     "recover": "make a cut-off log whole",
     "emulator": "the emulated robots and motion capture, as a daemon",
     "estimator": "the estimator, as a daemon",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 @click.option("--leader", metavar="NAME", help="Name of the leader's body.")
 @click.option("--follower", metavar="NAME", help="Name of the follower's body.")
 @click.option("--map", "chart", metavar="FILE", help="Names the topics of a log that is not abreast's.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key.")
 @click.option("--from", "from_s", type=float, metavar="S", help="Judge from here on.")
 @click.option("--to", "to_s", type=float, metavar="S", help="Judge up to here.")
 @click.option("--csv", "table", type=click.Path(path_type=Path), metavar="FILE", help="Write the estimates.")
@@ -38,6 +40,7 @@ def command(
     leader: str | None,
     follower: str | None,
     chart: str | None,
+    overrides: tuple[str, ...],
     from_s: float | None,
     to_s: float | None,
     table: Path | None,
@@ -59,7 +62,7 @@ def command(
     if from_s is not None and to_s is not None and to_s <= from_s:
         raise UsageError(f"--to {to_s:g}: expected more than --from {from_s:g}")
     given = read_log(log)
-    played = _played(given, chart, estimator, leader, follower, verify=verify)
+    played = _played(given, chart, estimator, leader, follower, overrides, verify=verify)
     evidence = evidence_of_replay(given, played, from_s, to_s)
     summary = summarise(evidence)
     if chart is None and (own_motion := judge_own_motion(given, played.scenario)):
@@ -87,6 +90,7 @@ def _played(
     estimator: str | None,
     leader: str | None,
     follower: str | None,
+    overrides: Sequence[str],
     *,
     verify: bool,
 ) -> Replay:
@@ -96,7 +100,7 @@ def _played(
     from hil.replay.topic_map import load_topic_map
     from hil.scenario.files import with_overrides
 
-    kind = [] if estimator is None else [f"estimator.kind={estimator}"]
+    kind = [*overrides] if estimator is None else [*overrides, f"estimator.kind={estimator}"]
     if chart is not None:
         if verify:
             raise UsageError("--verify: a log that needs --map has no estimates of ours; leave one out")
@@ -110,7 +114,8 @@ def _played(
     if verify and chosen != own:
         raise UsageError(
             f"--verify compares with what was recorded: by {own.estimator.kind}, of leader "
-            f"{own.leader.name!r} and follower {own.follower.name!r}; leave out what changes that"
+            f"{own.leader.name!r} and follower {own.follower.name!r}, with the log's own settings; leave out "
+            "what changes that"
         )
     return replay(log, chosen)
 

@@ -31,6 +31,7 @@ from estimation.own_motion import (
     own_motion,
 )
 from estimation.tracking import Status, Track, Tracker, TrackSettings, Verdict
+from formation.angles import wrap
 from formation.pose import Pose
 from hil.nodes.node import (
     Counts,
@@ -188,8 +189,11 @@ class EstimatorNode:
         state = replace(state, taken=counted(state.taken, "frames"))
         motion = follower_motion(state.history, sighting.capture_ns, self.trust)
         given = self.scenario.estimator
+        rho, alpha2 = sighting.rho - given.range_bias, float(wrap(sighting.alpha2 - given.bearing_bias))
+        if rho <= 0.0:
+            raise RefusedError("bad_range")
         measurement = measure_body(
-            sighting.capture_ns, sighting.rho, sighting.alpha2, given.sigma_range, given.sigma_bearing, motion
+            sighting.capture_ns, rho, alpha2, given.sigma_range, given.sigma_bearing, motion
         )
         return self._add(state, measurement)
 

@@ -156,6 +156,7 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``input_delay_s`` after its signal, and up to ``input_lag_s`` later still.
     ``own_motion``: where v2 and u2 come from: odometry, the follower's own mocap track, or both fused.
     ``sigma_range``, ``sigma_bearing``: of a body-frame sensor; for mocap they follow from the geometry.
+    ``range_bias`` [m], ``bearing_bias`` [rad]: by how much such a sensor's values are above the true ones.
     ``turn_bandwidth``: q_u = turn_bandwidth * k_u^2 per second (0.5 agile, 0.03 gentle leaders).
     ``kind`` smoother is for replays only.
     """
@@ -167,6 +168,8 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     sigma_heading: Positive = 0.0035
     sigma_range: Positive = 0.01
     sigma_bearing: Positive = 0.02
+    range_bias: float = 0.0
+    bearing_bias: float = 0.0
     sigma_v2: Positive = 0.005
     sigma_u2: Positive = 0.03
     input_delay_s: NonNegative = 0.0

@@ -254,3 +254,44 @@ def test_import_refuses_bad_rows_and_leaves_nothing(abreast: Any, tmp_path: Path
     assert "line 12, column 'r': 'far', expected a number" in answer.err
     assert answer.err.count("\n") == 1
     assert not out.exists()
+
+
+def test_a_sensor_is_calibrated_and_replayed_as_the_command_says(abreast: Any, tmp_path: Path) -> None:
+    rows = "".join(
+        f"{100 + 0.1 * n:.1f},0.25,1.4708,0,0.1,{0.01 * n:.2f},0.2,0,{0.01 * n:.2f},0,0\n" for n in range(60)
+    )
+    (tmp_path / "lab.csv").write_text("t,r,b,u,v,lx,ly,lth,fx,fy,fth\n" + rows)
+    truth = {
+        "leader_x": "lx",
+        "leader_y": "ly",
+        "follower_x": "fx",
+        "follower_y": "fy",
+        "follower_theta": "fth",
+    }
+    named = "".join(f'{name} = "{column}"\n' for name, column in truth.items())
+    (tmp_path / "lab.toml").write_text(COLUMNS.replace("[truth]\n", f"[truth]\n{named}"))
+    out = tmp_path / "lab.mcap"
+    abreast("import", "csv", tmp_path / "lab.csv", "--map", tmp_path / "lab.toml", "--out", out)
+    answer = abreast("calibrate", out, "--to", "104", "--json")
+    assert answer.code == 0
+    found = json.loads(answer.out)
+    assert found["range_bias"] == pytest.approx(0.05, abs=1e-6)
+    assert found["bearing_bias"] == pytest.approx(-0.1, abs=1e-4)
+    words = answer.err.split("abreast replay ")[1].split()
+    table = tmp_path / "estimates.csv"
+    assert abreast("replay", *words, "--csv", table).code == 0
+    with table.open() as stream:
+        last = list(csv.DictReader(stream))[-1]
+    assert float(last["rho"]) == pytest.approx(0.2, abs=1e-3)
+    assert float(last["alpha2"]) == pytest.approx(1.5708, abs=1e-3)
+    assert abreast("calibrate", out, "--to", "100.5").code == 2
+    answer = abreast("replay", *words, "--verify")
+    assert answer.code == 2
+    assert "--verify compares with what was recorded" in answer.err
+
+
+def test_a_log_without_sightings_is_not_calibrated(abreast: Any, run_log: Path) -> None:
+    answer = abreast("calibrate", run_log)
+    assert answer.code == 2
+    assert "has no sightings to calibrate" in answer.err
+    assert answer.err.count("\n") == 1

@@ -1,0 +1,95 @@
+"""Calibration of a range and bearing sensor, from a log with mocap poses of both robots beside sightings."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.sensor_bias import SensorBias, TooFewSightingsError, find_sensor_bias
+from formation.angles import FloatArray, wrap
+from hil.errors import UsageError
+from hil.judge.evidence import IMPORT
+from hil.log.events import logged_events
+from hil.log.metadata import mode_of
+from hil.log.reader import Log
+from hil.recordings.smoothed_track import poses_at
+from hil.scenario.schema import Scenario
+from hil.wire import topics
+from hil.wire.intake import RefusedError, Sighting, read_frame, read_sighting
+from hil.wire.message_types import Truth
+from hil.wire.messages import MalformedPayloadError, decode_as, to_ns
+from hil.wire.topics import Topics, topics_of
+
+Poses = dict[int, tuple[float, float, float, float, float]]
+"""Leader's x, y [m] and follower's x, y [m], theta [rad] by capture time [ns]."""
+
+
+def calibrate(
+    log: Log, scenario: Scenario, from_s: float | None = None, to_s: float | None = None
+) -> SensorBias:
+    """Offsets of the sightings of a log, or of its span from ``from_s`` to ``to_s``.
+
+    Times [s] are the source's own in an imported log, else they count from its first sighting. Poses are
+    those of mocap frames, in a log without these those of its truth; they are taken linear between
+    neighbours. Raises :class:`UsageError` for a log without sightings or without poses, and for a span that
+    tells too little.
+    """
+    names = topics_of(scenario)
+    if names.sighting not in log.topics:
+        raise UsageError(
+            f"log {log.path}: has no sightings to calibrate, expected topic {names.sighting!r}; "
+            f"topics there: {', '.join(sorted(log.topics)) or 'none'}"
+        )
+    source = topics.RIGID_BODIES if topics.RIGID_BODIES in log.topics else topics.TRUTH
+    sightings: dict[int, Sighting] = {}
+    poses: Poses = {}
+    for event, now_ns in logged_events(log, [source, names.sighting]):
+        try:
+            if event.topic == names.sighting:
+                sighting = read_sighting(event.payload, now_ns)
+                sightings[sighting.capture_ns] = sighting
+            else:
+                poses |= _poses(event.topic, event.payload, names, now_ns)
+        except (RefusedError, MalformedPayloadError):
+            continue
+    if len(poses) < 2:
+        raise UsageError(
+            f"log {log.path}: has no poses of {names.leader!r} and {names.follower!r} beside its sightings; "
+            f"expected mocap frames on {topics.RIGID_BODIES!r}, or poses in the [truth] of the import's map"
+        )
+    zero_ns = 0 if mode_of(log) == IMPORT else min(sightings, default=0)
+    chosen = [
+        sighting
+        for capture_ns, sighting in sorted(sightings.items())
+        if (from_s is None or capture_ns >= zero_ns + round(from_s * 1e9))
+        and (to_s is None or capture_ns <= zero_ns + round(to_s * 1e9))
+    ]
+    seen = np.array([(each.rho, each.alpha2) for each in chosen]).reshape(-1, 2)
+    try:
+        return find_sensor_bias(seen, _true(poses, [each.capture_ns for each in chosen]))
+    except TooFewSightingsError as error:
+        raise UsageError(f"log {log.path}: {error}; give a longer span") from None
+
+
+def _poses(topic: str, payload: bytes, names: Topics, now_ns: int) -> Poses:
+    if topic == topics.RIGID_BODIES:
+        frame = read_frame(payload, names.leader, names.follower, now_ns)
+        own = frame.follower
+        return {frame.capture_ns: (*frame.leader, own.x, own.y, own.theta)}
+    truth = decode_as(payload, Truth)
+    told = (truth.leader_x, truth.leader_y, truth.follower_x, truth.follower_y, truth.follower_theta)
+    return {to_ns(truth.header.stamp): told} if all(map(math.isfinite, told)) else {}
+
+
+def _true(poses: Poses, moments_ns: list[int]) -> FloatArray:
+    """True ranges and bearings (n, 2) at some moments, NaN where poses are not known."""
+    stamps_ns = np.array(sorted(poses), dtype=np.int64)
+    known = np.array([poses[stamp] for stamp in stamps_ns.tolist()])
+    wanted: NDArray[np.int64] = np.array(moments_ns, dtype=np.int64)
+    follower = poses_at(stamps_ns, known[:, 2:5], wanted)
+    leader = poses_at(stamps_ns, np.column_stack([known[:, 0:2], np.zeros(len(known))]), wanted)
+    away = leader[:, 0:2] - follower[:, 0:2]
+    bearing = wrap(np.arctan2(away[:, 1], away[:, 0]) - follower[:, 2])
+    return np.column_stack([np.hypot(away[:, 0], away[:, 1]), bearing])
