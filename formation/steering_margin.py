@@ -1,0 +1,90 @@
+"""How hard a leader may steer: a bracket of the k_u* that Prop. 3 of the paper says to exist.
+
+Prop. 3: for |u1| <= k_u < k_u* a continuous periodic steering gives one exponentially stable periodic orbit
+near the abreast formation. Its proof names no number; here are two, for a leader of constant speed v1.
+
+Below ``lower`` this is proved. The set of :func:`formation.invariant_set.invariant_set` for D = k_u keeps
+all motions that begin in it. In it the Jacobian of (5) under (8) is J = [[0, -v c], [v f', -mu1 c]] with
+c = cos(theta), theta = alpha1 + pi/2. In the constant metric P = [[a, b], [b, 1]], b = -mu1 / (2 v), the
+matrix P J + J^T P is negative definite if and only if (q - kappa)^2 < (mu1 / v)^2 q, with q = f' / c and
+kappa = a - (mu1 / v)^2 / 2 free to choose; other b serve no better. In s = sqrt(q) that is
+s^2 - s mu1 / v < kappa < s^2 + s mu1 / v, and one kappa serves a whole range of s if and only if
+max(s) - min(s) < mu1 / v. Then all distances within the set shrink exponentially, and the map over one period
+has one fixed point in it.
+
+Above ``upper`` a counterexample is at hand. A leader that turns at -k_u for long brings the pair to the
+equilibrium of that turn, or none exists (k_u >= mu_rho v1). If it then turns at +k_u and alpha1 passes the
+saddle at +pi/2, the formation is lost; long holds joined by short ramps are a continuous periodic steering
+that does so in every period, and no stable orbit near the formation can answer to it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from formation.invariant_set import Disturbed, InvariantSet, SpeedRange, invariant_set
+from formation.spacing import Spacing
+
+_RESOLUTION = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class SteeringMargin:
+    """Bracket [rad/s] of k_u*: proved below ``lower``, refuted above ``upper``."""
+
+    lower: float
+    upper: float
+
+
+def steering_margin(mu1: float, spacing: Spacing, v1: float) -> SteeringMargin:
+    """Bracket of k_u* (to 1e-4 of itself) for gain mu1 [rad/s] and constant leader speed v1 [m/s]."""
+    cap = spacing.mu_rho * v1
+    lower, _ = _edge(lambda k_u: settles(_system(mu1, spacing, v1, k_u)), 0.0, cap)
+    _, upper = _edge(lambda k_u: not can_be_thrown_off(_system(mu1, spacing, v1, k_u)), lower, cap)
+    return SteeringMargin(lower, upper)
+
+
+def settles(system: Disturbed) -> bool:
+    """Whether all motions in the invariant set provably approach each other (constant speed)."""
+    found = invariant_set(system)
+    return found is not None and contracts(system, found)
+
+
+def contracts(system: Disturbed, found: InvariantSet) -> bool:
+    """Whether max(s) - min(s) < mu1 / v1 over a set, s = sqrt(f' / cos(theta)), |theta| < pi/2.
+
+    s is largest on the boundary (for any rho it grows with |theta|) and smallest at rho_max, theta = 0.
+    """
+    largest = 0.0
+    for rho, psi in (found.inward, found.outward):
+        cosine = np.cos(psi)
+        if psi.max() >= 0.5 * math.pi:
+            return False
+        largest = max(largest, math.sqrt(float(np.max(system.spacing.f_prime(rho) / cosine))))
+    smallest = math.sqrt(system.spacing.f_prime(found.rho_max))
+    return largest - smallest < system.mu1 / system.speeds.lowest
+
+
+def can_be_thrown_off(system: Disturbed) -> bool:
+    """Whether a swing from one constant turn at the limit to the other carries alpha1 over the saddle."""
+    spacing, held = system.spacing, system.D / (system.spacing.mu_rho * system.speeds.lowest)
+    if held >= 1.0:
+        return True
+    far, near = spacing.rho_0 / math.sqrt(1.0 - held), spacing.rho_0 / math.sqrt(1.0 + held)
+    return system.escapes(far, 0.0, 1.0) or system.escapes(near, 0.0, -1.0)
+
+
+def _system(mu1: float, spacing: Spacing, v1: float, k_u: float) -> Disturbed:
+    return Disturbed(mu1, spacing, SpeedRange(v1, v1), k_u)
+
+
+def _edge(holds: Callable[[float], bool], low: float, high: float) -> tuple[float, float]:
+    """Two numbers next to each other in [low, high], of which the first still holds."""
+    while high - low > _RESOLUTION * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low, high
