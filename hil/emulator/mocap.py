@@ -18,6 +18,7 @@ from formation.pose import Motion, Pose
 
 _FULL_NOISE_SPEED = 0.05
 _FULL_NOISE_TURN = 0.2
+_NS = 1e-9
 
 
 class Stream(IntEnum):
@@ -48,6 +49,26 @@ class Delivery:
     latency: float
     jitter: float
     loss: float
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureClock:
+    """The motion capture's own clock: ahead of the host's by ``offset`` [s], faster by ``drift`` (a share).
+
+    It jumps by ``jump`` [s] when the leader has been driving for ``jump_at`` [s].
+    """
+
+    offset: float = 0.0
+    drift: float = 0.0
+    jump: float = 0.0
+    jump_at: float = 0.0
+
+    def stamp_ns(self, at_ns: int, begun_ns: int, motion_since_ns: int | None) -> int:
+        """What it shows at a host time, in a run that began, and whose leader set off, at the given ones."""
+        ahead = self.offset + self.drift * (at_ns - begun_ns) * _NS
+        if motion_since_ns is not None and (at_ns - motion_since_ns) * _NS >= self.jump_at:
+            ahead += self.jump
+        return at_ns + round(ahead / _NS)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from formation.pose import STANDSTILL, Motion
 from hil.emulator.lab_messages import frame_message, odometry_message, truth_message
-from hil.emulator.mocap import Delivery, MocapNoise, Stream, draw_frame, normals, observe
+from hil.emulator.mocap import CaptureClock, Delivery, MocapNoise, Stream, draw_frame, normals, observe
 from hil.emulator.robot import Actuators, Robot, drive
 from hil.nodes.node import Counts, Event, Outgoing, counted, diagnostics, named_counts, no_counts, outgoing
 from hil.scenario.parts import leader_program, start_poses
@@ -72,6 +72,9 @@ class EmulatorNode:
         )
         self.noise = MocapNoise(mocap.sigma_position, mocap.sigma_heading, mocap.static_fraction)
         self.delivery = Delivery(mocap.latency_s, mocap.jitter_s, mocap.loss)
+        self.clock = CaptureClock(
+            mocap.clock_offset_s, mocap.clock_drift_ppm * 1e-6, mocap.clock_jump_s, mocap.clock_jump_at_s
+        )
         self._handlers: dict[str, Callable[[EmulatorState, bytes, int], EmulatorState]] = {
             self.topics.cmd_vel: self._on_command,
             topics.STOP: self._on_stop,
@@ -162,7 +165,8 @@ class EmulatorNode:
                 (self.topics.leader, observe(leader.pose, leader.motion, self.noise, draw.leader)),
                 (self.topics.follower, observe(follower.pose, follower.motion, self.noise, draw.follower)),
             )
-            frame = outgoing(topics.RIGID_BODIES, frame_message(at_ns, number, bodies), at_ns)
+            stamp_ns = self.clock.stamp_ns(at_ns, state.begun_ns, state.motion_since_ns)
+            frame = outgoing(topics.RIGID_BODIES, frame_message(stamp_ns, number, bodies), at_ns)
             pending = list(state.pending)
             insort(pending, (at_ns + round(draw.delay / _NS), number, frame), key=lambda item: item[:2])
             state = replace(state, pending=tuple(pending))

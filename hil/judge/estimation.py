@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.belief import Model
 from estimation.cramer_rao import TruePath, cramer_rao
@@ -16,6 +17,7 @@ from estimation.tracking import Status
 from formation.angles import FloatArray, wrap
 from hil.judge.columns import Columns, inside
 from hil.judge.evidence import Evidence, Span
+from hil.judge.true_states import Stamps
 from hil.scenario.schema import Scenario
 
 WARM_UP_NS = 3_000_000_000
@@ -23,6 +25,8 @@ WARM_UP_NS = 3_000_000_000
 
 EVERY = 8
 """Of so many samples the bound is looked at in one: it moves as slowly as the leader."""
+
+_SAME_NS = 2_000_000
 
 
 def judge_estimation(evidence: Evidence, columns: Columns) -> dict[str, object]:
@@ -115,12 +119,23 @@ def _efficiency(evidence: Evidence, columns: Columns, rmse: Mapping[str, float])
         follower_motion=motion,
         measured=np.isin(moments, np.asarray(evidence.frames.captures_ns, dtype=np.int64)),
     )
-    at_samples = np.flatnonzero(np.isin(moments, columns.samples.capture_ns))[::EVERY]
+    at_samples = _nearest(moments, columns.samples.capture_ns)[::EVERY]
     wanted = np.zeros(len(moments), dtype=np.bool_)
     wanted[at_samples] = True
     bounds = cramer_rao(path, _model(given), pose_noise, sd_v2, sd_u2, wanted)
-    best = {name: _rms(bound[np.isfinite(bound)]) for name, bound in bounds.items()}
+    sizes = {name: bound[np.isfinite(bound)] for name, bound in bounds.items()}
+    best = {name: _rms(bound) if len(bound) else 0.0 for name, bound in sizes.items()}
     return {name: rmse[name] / best[name] for name in rmse if best[name] > 0.0}
+
+
+def _nearest(moments_ns: Stamps, wanted_ns: Stamps) -> NDArray[np.int64]:
+    """Rows of the increasing moments that are within 2 ms of wanted ones: a clock is estimated no better."""
+    after = np.minimum(np.searchsorted(moments_ns, wanted_ns), len(moments_ns) - 1)
+    before = np.maximum(after - 1, 0)
+    nearer = np.abs(moments_ns[after] - wanted_ns) <= np.abs(moments_ns[before] - wanted_ns)
+    rows = np.where(nearer, after, before)
+    found: NDArray[np.int64] = np.unique(rows[np.abs(moments_ns[rows] - wanted_ns) <= _SAME_NS])
+    return found
 
 
 def _model(scenario: Scenario) -> Model:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TypeVar
 
+from estimation.clock import Arrival
 from hil.errors import UsageError
 from hil.log.metadata import mode_of, scenario_of
 from hil.log.reader import Log, Record
@@ -56,7 +57,8 @@ class Evidence:
     seconds counts from. ``motion_since_ns``: when an emulated leader set off, None for other recordings.
     ``stopped_ns``: when the first stop was ordered, None for none. ``evaluate_from_ns``,
     ``evaluate_to_ns``: limits of the evaluation that take the place of those in the scenario. ``frames`` and
-    ``log``: None where they are not known.
+    ``log``: None where they are not known. ``arrivals``: all frames that the estimator could read, as they
+    came.
 
     A replay is judged on the evidence of its log with its own estimates and counts put in by
     :func:`dataclasses.replace`.
@@ -75,6 +77,7 @@ class Evidence:
     evaluate_from_ns: int | None = None
     evaluate_to_ns: int | None = None
     frames: Frames | None = None
+    arrivals: Sequence[Arrival] = ()
     log: LogFacts | None = None
 
 
@@ -136,6 +139,7 @@ def evidence_of_log(log: Log, scenario: Scenario | None = None) -> Evidence:
     counts = _last_counts(_decoded(log, records[topics.DIAGNOSTICS], DiagnosticArray))
     estimates = _decoded(log, records[names.estimate], LeaderEstimate)
     truth = _decoded(log, records[topics.TRUTH], Truth)
+    arrivals = _arrivals(log, records[topics.RIGID_BODIES], estimates)
     since = counts.get("emulator", {}).get("motion_since_ns")
     evidence = Evidence(
         scenario=scenario,
@@ -147,7 +151,8 @@ def evidence_of_log(log: Log, scenario: Scenario | None = None) -> Evidence:
         refused=_group(counts.get("estimator", {}), "refused"),
         motion_since_ns=None if since is None else int(since),
         stopped_ns=records[topics.STOP][0].log_ns if records[topics.STOP] else None,
-        frames=_frames(log, records[topics.RIGID_BODIES], estimates, truth),
+        frames=_frames(scenario, arrivals, truth),
+        arrivals=arrivals,
         log=LogFacts(str(log.path), log.messages, log.path.stat().st_size),
     )
     return replace(evidence, zero_ns=_zero_ns(log, evidence))
@@ -207,26 +212,43 @@ def _group(values: Mapping[str, str], group: str) -> dict[str, int]:
     return {key.removeprefix(prefix): int(text) for key, text in values.items() if key.startswith(prefix)}
 
 
-def _frames(
-    log: Log, records: Sequence[Record], estimates: Sequence[LeaderEstimate], truth: Sequence[Truth]
-) -> Frames | None:
+def _arrivals(log: Log, records: Sequence[Record], estimates: Sequence[LeaderEstimate]) -> list[Arrival]:
+    """Frames that the estimator got, in the order in which it did.
+
+    Those are the ones that its estimates have receipts for; in a log without estimates all, as logged.
+    """
+    got = {each.digest: to_ns(each.received) for estimate in estimates for each in estimate.consumed}
+    names = [digest(record.topic, record.payload) for record in records]
+    received = [
+        (got.get(name, record.log_ns), record)
+        for name, record in zip(names, records, strict=True)
+        if name in got or not estimates
+    ]
+    found: list[Arrival] = []
+    for receive_ns, record in sorted(received, key=lambda item: item[0]):
+        for frame in _decoded(log, [record], RigidBodies):
+            try:
+                capture_ns = to_ns(frame.header.stamp)
+            except MalformedPayloadError:
+                continue  # the estimator refused it too
+            found.append(Arrival(frame.frame_number, capture_ns, receive_ns))
+    return found
+
+
+def _frames(scenario: Scenario, arrivals: Sequence[Arrival], truth: Sequence[Truth]) -> Frames | None:
     """Frames by their numbers, so that one that came twice counts once; None for fewer than two.
 
-    The estimator got those that its estimates have receipts for. What was captured is known from the truth of
-    an emulated run; elsewhere from the numbers themselves, whose commonest step is taken for that of frames
-    in a row.
+    What was captured is known from the truth of an emulated run, on the host's clock; elsewhere from the
+    numbers themselves, whose commonest step is taken for that of frames in a row.
     """
-    got = {receipt.digest for estimate in estimates for receipt in estimate.consumed}
-    taken_in = [record for record in records if digest(record.topic, record.payload) in got]
     captured = {each.frame_number: to_ns(each.header.stamp) for each in truth}
+    mocap = scenario.mocap
+    own_clock = any((mocap.clock_offset_s, mocap.clock_drift_ppm, mocap.clock_jump_s))
     found: dict[int, int] = {}
-    for frame in _decoded(log, taken_in, RigidBodies):
-        try:
-            stamp_ns = to_ns(frame.header.stamp)
-        except MalformedPayloadError:
-            continue  # the estimator refused it too
-        if not captured or captured.get(frame.frame_number) == stamp_ns:
-            found[frame.frame_number] = stamp_ns
+    for arrival in arrivals:
+        true_ns = captured.get(arrival.number)
+        if not captured or true_ns == arrival.capture_ns or (own_clock and true_ns is not None):
+            found[arrival.number] = arrival.capture_ns if true_ns is None else true_ns
     numbers = sorted(found)
     if len(numbers) < 2:
         return None

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from estimation.host_time import HostTime
 from estimation.input_alignment import align_odometry
 from hil.log.reader import Log
+from hil.nodes.frame_time import FrameTime
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.intake import RefusedError, read_frame, read_odometry
@@ -21,6 +23,7 @@ def judge_own_motion(log: Log, scenario: Scenario) -> dict[str, float]:
     names = topics_of(scenario)
     poses: dict[int, tuple[float, float, float]] = {}
     motions: dict[int, tuple[float, float]] = {}
+    times, frame_time = HostTime(), FrameTime(scenario)
     if not {topics.RIGID_BODIES, names.odom} <= set(log.topics):
         return {}
     for record in log.records([topics.RIGID_BODIES, names.odom]):
@@ -29,8 +32,11 @@ def judge_own_motion(log: Log, scenario: Scenario) -> dict[str, float]:
                 sample = read_odometry(record.payload, record.log_ns)
                 motions[sample.stamp_ns] = (sample.v2, sample.u2)
             else:
-                frame = read_frame(record.payload, names.leader, names.follower, record.log_ns)
-                poses[frame.capture_ns] = (frame.follower.x, frame.follower.y, frame.follower.theta)
+                frame = read_frame(record.payload, names.leader, names.follower)
+                timed = frame_time.of(times, frame, record.log_ns)
+                times = timed.times
+                if not timed.refusal:
+                    poses[timed.capture_ns] = (frame.follower.x, frame.follower.y, frame.follower.theta)
         except RefusedError:
             continue
     zero_ns = min((*poses, *motions), default=0)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.judge.bounds import judge_bounds
+from hil.judge.clock import judge_clock
 from hil.judge.columns import Columns, columns_of
 from hil.judge.estimation import judge_estimation
 from hil.judge.evidence import Evidence
@@ -43,6 +44,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "bounds": judge_bounds(given, columns),
         "formation": judge_formation(evidence, columns),
         "latency_ms": _latency(columns),
+        "clock": judge_clock(evidence.arrivals),
         "commands": _commands(columns),
         "rejected": dict(evidence.refused),
         "log": None if evidence.log is None else asdict(evidence.log),

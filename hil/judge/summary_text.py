@@ -97,6 +97,25 @@ def _wire_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
             f"capture to command {latency['p50']:.1f} ms, p99 {latency['p99']:.1f}, max {latency['max']:.1f}"
         )
         yield "latency", text, PLAIN
+    yield from _clock_lines(summary)
+
+
+def _clock_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    clock, own = summary.get("clock"), summary.get("own_motion")
+    if clock:
+        jitter, offset = clock["jitter_ms"], clock["offset_ms"]
+        side = f"{-offset:.1f} ms after" if offset <= 0.0 else f"{offset:.1f} ms before"
+        drift = f", drift {round(clock['drift_ppm'], 1) + 0.0} ppm" if "drift_ppm" in clock else ""
+        text = f"frames come {side} their stamps at the least{drift}"
+        yield "clock", f"{text}, jitter p50 {jitter['p50']:.1f} ms, p99 {jitter['p99']:.1f}", PLAIN
+    if own:
+        parts = []
+        if "delay_s" in own:
+            parts.append(f"moves {round(1e3 * own['delay_s'])} ms after odometry")
+        for name, what in (("scale_v", "speed"), ("scale_u", "turn rate")):
+            if name in own:
+                parts.append(f"{what} {own[name]:.3f} of odometry's")
+        yield "follower", ", ".join(parts), PLAIN
 
 
 def extended_violations(summary: Mapping[str, Any]) -> dict[str, int]:
@@ -145,6 +164,10 @@ def _wire_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     lost, published = frames.get("lost", 0), frames.get("published", 0)
     if lost > LOST_SHARE * published:
         yield f"{lost / published:.1%} of the frames never reached the estimator"
+    clock = summary.get("clock", {})
+    if clock.get("jumps"):
+        times = "once" if clock["jumps"] == 1 else f"{clock['jumps']} times"
+        yield f"the clock of the motion capture jumped {times}"
     rejected = summary.get("rejected", {})
     if rejected:
         causes = ", ".join(f"{cause.replace('_', ' ')} {count}" for cause, count in sorted(rejected.items()))

@@ -12,6 +12,7 @@ from msgspec.structs import replace
 from estimation.belief import Model
 from estimation.estimate import Estimate, estimate_of
 from estimation.estimators import make_estimator, settling
+from estimation.host_time import HostTime
 from estimation.inputs import History, InputTrust, follower_motion, remember
 from estimation.measurement import (
     FrontEnd,
@@ -33,6 +34,7 @@ from estimation.own_motion import (
 from estimation.tracking import Status, Track, Tracker, TrackSettings, Verdict
 from formation.angles import wrap
 from formation.pose import Pose
+from hil.nodes.frame_time import FrameTime
 from hil.nodes.node import (
     Counts,
     Event,
@@ -70,7 +72,8 @@ REASONS = {
 class EstimatorState(Struct, frozen=True):
     """All that the estimator remembers.
 
-    ``own``: the follower's own mocap track, empty where odometry alone tells of its motion. ``receipts``:
+    ``own``: the follower's own mocap track, empty where odometry alone tells of its motion. ``times``: what
+    is known of the clock that frames are stamped by. ``receipts``:
     inputs since the last estimate. ``refused``: inputs that were not used, by cause. ``taken``: inputs that
     were used, by kind. ``last_status``: of the last estimate that went out.
     """
@@ -78,6 +81,7 @@ class EstimatorState(Struct, frozen=True):
     track: Track = ()
     history: History = ()
     own: OwnTrack = ()
+    times: HostTime = HostTime()
     receipts: tuple[Consumed, ...] = ()
     refused: Counts = field(default_factory=no_counts)
     taken: Counts = field(default_factory=no_counts)
@@ -116,6 +120,7 @@ class EstimatorNode:
         self.pose_noise = PoseNoise(given.sigma_position, given.sigma_heading)
         self.own_noise = OwnNoise(self.pose_noise, scenario.controller.v_max, scenario.controller.u_max)
         self.assumed = AssumedErrors.of(scenario)
+        self.frame_time = FrameTime(scenario)
         self._handlers: dict[str, Callable[[EstimatorState, bytes, int], EstimatorState]] = {
             topics.RIGID_BODIES: self._on_frame,
             self.topics.odom: self._on_odometry,
@@ -159,16 +164,23 @@ class EstimatorNode:
         return estimate_of(newest.belief, newest.measurement, status, newest.nis, newest.used_ns)
 
     def _on_frame(self, state: EstimatorState, payload: bytes, now_ns: int) -> EstimatorState:
-        frame = read_frame(payload, self.topics.leader, self.topics.follower, now_ns)
+        frame = read_frame(payload, self.topics.leader, self.topics.follower)
+        timed = self.frame_time.of(state.times, frame, now_ns)
+        state = replace(state, times=timed.times)
+        if timed.refusal:
+            return replace(state, refused=counted(state.refused, timed.refusal))
+        if timed.restart:
+            state = replace(state, track=(), own=())
+        capture_ns = timed.capture_ns
         state = replace(state, taken=counted(state.taken, "frames"))
         if frame.strangers:
             state = replace(state, refused=counted(state.refused, "unknown_body"))
         leader, follower = frame.leader, frame.follower
         if math.dist(leader, (follower.x, follower.y)) < _SAME_PLACE:
             raise RefusedError("same_place")
-        own, motion = self._own_motion(state, frame.capture_ns, follower)
+        own, motion = self._own_motion(state, capture_ns, follower)
         measure = measure_world if self.front_end is FrontEnd.WORLD else measure_body_from_mocap
-        return self._add(state, measure(frame.capture_ns, leader, follower, self.pose_noise, motion), own)
+        return self._add(state, measure(capture_ns, leader, follower, self.pose_noise, motion), own)
 
     def _own_motion(
         self, state: EstimatorState, capture_ns: int, pose: Pose
@@ -252,5 +264,6 @@ class EstimatorNode:
         problem = "" if state.track and moving else "waiting for mocap and odometry"
         status = self.tracker.status(state.track, now_ns)
         values: dict[str, object] = {"status": status.name.lower()}
+        values |= self.frame_time.report(state.times)
         values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)

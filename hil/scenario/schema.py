@@ -23,6 +23,7 @@ OfflineName = Literal["smoother"]
 OFFLINE_ESTIMATORS: tuple[OfflineName, ...] = get_args(OfflineName)
 FrontEnd = Literal["world", "body"]
 OwnMotion = Literal["odometry", "mocap", "fused"]
+ClockName = Literal["trusted", "estimated"]
 
 
 class _Section(Struct, frozen=True, forbid_unknown_fields=True):
@@ -137,7 +138,11 @@ class RobotSection(_Section, frozen=True, kw_only=True):
 
 
 class MocapSection(_Section, frozen=True, kw_only=True):
-    """The emulated motion capture: noise of a moving body, the share a standing one has, delivery."""
+    """The emulated motion capture: noise of a moving body, the share a standing one has, delivery.
+
+    Its clock is ahead of the host's by ``clock_offset_s``, runs faster by ``clock_drift_ppm``, and jumps by
+    ``clock_jump_s`` when the leader has been driving for ``clock_jump_at_s``.
+    """
 
     rate_hz: Rate = 120.0
     sigma_position: NonNegative = 0.0003
@@ -146,6 +151,10 @@ class MocapSection(_Section, frozen=True, kw_only=True):
     latency_s: NonNegative = 0.03
     jitter_s: NonNegative = 0.0
     loss: Probability = 0.0
+    clock_offset_s: float = 0.0
+    clock_drift_ppm: Annotated[float, Meta(ge=-500.0, le=500.0)] = 0.0
+    clock_jump_s: float = 0.0
+    clock_jump_at_s: NonNegative = 0.0
 
 
 class EstimatorSection(_Section, frozen=True, kw_only=True):
@@ -158,12 +167,16 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``sigma_range``, ``sigma_bearing``: of a body-frame sensor; for mocap they follow from the geometry.
     ``range_bias`` [m], ``bearing_bias`` [rad]: by how much such a sensor's values are above the true ones.
     ``turn_bandwidth``: q_u = turn_bandwidth * k_u^2 per second (0.5 agile, 0.03 gentle leaders).
+    ``clock``: trusted takes the stamps of mocap frames for host time; estimated maps them to it by what is
+    seen of their delays, of which ``transport_latency_s`` is known to be the way.
     ``kind`` smoother is for replays only.
     """
 
     kind: EstimatorName | OfflineName = "ekf"
     front_end: FrontEnd = "world"
     own_motion: OwnMotion = "odometry"
+    clock: ClockName = "trusted"
+    transport_latency_s: NonNegative = 0.0
     sigma_position: Positive = 0.0003
     sigma_heading: Positive = 0.0035
     sigma_range: Positive = 0.01

@@ -55,8 +55,8 @@ class Sighting:
     alpha2: float
 
 
-def read_frame(payload: bytes, leader: str, follower: str, now_ns: int) -> Frame:
-    """Decode and check a mocap frame.
+def read_frame(payload: bytes, leader: str, follower: str, now_ns: int | None = None) -> Frame:
+    """Decode and check a mocap frame; without ``now_ns`` its stamp may lie in the future.
 
     Raises :class:`RefusedError` by cause: malformed, bad_stamp, unknown_body (it holds strangers only),
     missing_leader, missing_follower, duplicate_body, not_finite, out_of_range, bad_quaternion, tilted (z is
@@ -115,12 +115,12 @@ def _decode(payload: bytes, kind: type[M]) -> M:
         raise RefusedError("malformed") from None
 
 
-def _stamp(header: msg.Header, now_ns: int) -> int:
+def _stamp(header: msg.Header, now_ns: int | None) -> int:
     try:
         stamp_ns = to_ns(header.stamp)
     except MalformedPayloadError:
         raise RefusedError("bad_stamp") from None
-    if stamp_ns > now_ns + CLOCK_TOLERANCE_NS:
+    if now_ns is not None and stamp_ns > now_ns + CLOCK_TOLERANCE_NS:
         raise RefusedError("bad_stamp")
     return stamp_ns
 

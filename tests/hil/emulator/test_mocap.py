@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import binom, kstest
 
 from formation.pose import STANDSTILL, Motion, Pose
-from hil.emulator.mocap import Delivery, MocapNoise, Stream, draw_frame, normals, observe
+from hil.emulator.mocap import CaptureClock, Delivery, MocapNoise, Stream, draw_frame, normals, observe
 
 DELIVERY = Delivery(latency=0.03, jitter=0.02, loss=0.05)
 COUNT = 4000
@@ -83,3 +83,12 @@ def test_headings_stay_on_the_circle() -> None:
     noise = MocapNoise(0.0, 0.1, 1.0)
     seen = observe(Pose(0.0, 0.0, math.pi), Motion(1.0, 0.0), noise, (0.0, 0.0, 1.0))
     assert seen.theta == pytest.approx(0.1 - math.pi)
+
+
+def test_a_clock_of_its_own_is_ahead_drifts_and_jumps() -> None:
+    clock = CaptureClock(offset=5.0, drift=1e-4, jump=-2.0, jump_at=3.0)
+    second = 1_000_000_000
+    assert clock.stamp_ns(10 * second, 0, None) == 15_001_000_000
+    assert clock.stamp_ns(10 * second, 0, 8 * second) == 15_001_000_000
+    assert clock.stamp_ns(10 * second, 0, 7 * second) == 13_001_000_000
+    assert CaptureClock().stamp_ns(10 * second, 0, 0) == 10 * second

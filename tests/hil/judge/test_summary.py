@@ -54,6 +54,7 @@ def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
             "orbit_deviation_rms",
         },
         "latency_ms": {"capture_to_command"},
+        "clock": {"offset_ms", "jitter_ms", "jumps"},
         "commands": {"sent", "saturated", "stopped"},
         "rejected": parts["rejected"],
         "log": {"path", "messages", "bytes"},
@@ -64,6 +65,7 @@ def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
     assert set(judged["bounds"]["violations"]) == BOUNDS
     assert set(judged["formation"]["orbit_deviation_rms"]) == {"rho", "alpha1"}
     assert set(judged["latency_ms"]["capture_to_command"]) == {"p50", "p99", "max"}
+    assert set(judged["clock"]["jitter_ms"]) == {"p50", "p99", "max"}
     assert as_json(judged)
 
 
