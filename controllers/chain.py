@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,7 +10,7 @@ import numpy as np
 from controllers import chain_kernels as kernels
 from controllers.laws import Gains
 from controllers.limits import Limits
-from formation.angles import FloatArray, wrap
+from formation.angles import FloatArray
 from formation.closed_loop import IntegrationError
 from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
 from formation.pose import Pose
@@ -57,7 +56,7 @@ def simulate_chain(
 
     Each follower is told the true speed and shape of its predecessor, and with ``knows_turn`` its turn rate:
     law ``ideal``, otherwise ``independent``. Eq. (3) of the paper for every pair by Dormand and Prince's
-    5(4) with the given tolerances on (ln rho, alpha1, alpha2). Raises
+    5(4) with the given tolerances on (rho, alpha1, alpha2). Raises
     :class:`~formation.closed_loop.IntegrationError` if the motion breaks down, :class:`ValueError` if there
     is no pair, if fewer than two times are given or if the program is of no known kind.
     """
@@ -66,19 +65,21 @@ def simulate_chain(
     if len(times) < 2 or not np.all(np.diff(times) > 0.0):
         raise ValueError("a trajectory needs at least two times, in increasing order")
     kind, numbers = _encoded(program)
-    start = [number for shape in shapes for number in (math.log(shape.rho), shape.alpha1, shape.alpha2)]
+    start = [number for shape in shapes for number in (shape.rho, shape.alpha1, shape.alpha2)]
     state = np.array([*start, first.x, first.y, first.theta])
     states = np.empty((len(times), len(state)))
     motions = np.empty((len(times), 3, len(shapes) + 1))
     moments = np.ascontiguousarray(times, dtype=np.float64)
     setting = _setting(gains, limits, knows_turn=knows_turn)
     step = program.longest_step
+    poses = np.empty((len(times), len(shapes) + 1, 3))
     done = kernels.integrate(
-        moments, relative, absolute, step, state, setting, kind, numbers, states, motions
+        moments, relative, absolute, step, state, setting, kind, numbers, states, motions, poses
     )
     if not done or not np.all(np.isfinite(states)):
         raise IntegrationError("the motion of the chain breaks down before its end")
-    return _tabulate(times, states, motions)
+    pairs, (wanted, v, u) = states[:, :-3].reshape(len(times), -1, 3), motions.transpose(1, 0, 2)
+    return ChainTrajectory(times, pairs[:, :, 0], pairs[:, :, 1], pairs[:, :, 2], wanted, v, u, poses)
 
 
 def _setting(gains: Gains, limits: Limits, *, knows_turn: bool) -> FloatArray:
@@ -99,18 +100,3 @@ def _encoded(program: LeaderProgram) -> tuple[int, FloatArray]:
         case Table(t, v, u):
             return kernels.TABLE, np.array([t, v, u], dtype=np.float64)
     raise ValueError(f"{type(program).__name__} is no kind of program that a chain can be given")
-
-
-def _tabulate(times: FloatArray, states: FloatArray, motions: FloatArray) -> ChainTrajectory:
-    pairs = states[:, :-3].reshape(len(times), -1, 3)
-    rho, alpha1, alpha2 = np.exp(pairs[:, :, 0]), wrap(pairs[:, :, 1]), wrap(pairs[:, :, 2])
-    poses = np.empty((len(times), motions.shape[2], 3))
-    poses[:, 0] = states[:, -3:]
-    for pair in range(rho.shape[1]):
-        line = poses[:, pair, 2] + alpha1[:, pair]
-        poses[:, pair + 1, 0] = poses[:, pair, 0] + rho[:, pair] * np.cos(line)
-        poses[:, pair + 1, 1] = poses[:, pair, 1] + rho[:, pair] * np.sin(line)
-        poses[:, pair + 1, 2] = line + math.pi - alpha2[:, pair]
-    poses[:, :, 2] = wrap(poses[:, :, 2])
-    wanted, v, u = (motions[:, row] for row in range(3))
-    return ChainTrajectory(times, rho, alpha1, alpha2, wanted, v, u, poses)
