@@ -45,14 +45,15 @@ class ProcessNoise:
     q_start: float = 0.0
 
     @staticmethod
-    def by_rule(limits: LeaderLimits, turn_bandwidth: float) -> ProcessNoise:
+    def by_rule(limits: LeaderLimits, turn_bandwidth: float, speed_bandwidth: float = 0.01) -> ProcessNoise:
         """Noise per second from the leader's limits.
 
-        q_v = (0.1 k_v)^2, q_u = turn_bandwidth k_u^2, and q_start = k_v^2: from rest to k_v within a second.
+        q_v = speed_bandwidth k_v^2, q_u = turn_bandwidth k_u^2, and q_start = k_v^2: from rest to k_v within
+        a second. A leader that changes its speed by steps of ``s`` k_v, one in ``T`` seconds, has a speed
+        bandwidth of s^2 / T; one that drives evenly within a tenth of k_v has 0.01.
         """
-        return ProcessNoise(
-            (0.1 * limits.k_v) ** 2, turn_bandwidth * limits.k_u**2, limits.v_eps, limits.k_v**2
-        )
+        k_v, k_u = limits.k_v, limits.k_u
+        return ProcessNoise(speed_bandwidth * k_v**2, turn_bandwidth * k_u**2, limits.v_eps, k_v**2)
 
 
 @dataclass(frozen=True, slots=True)

@@ -140,7 +140,11 @@ def _nearest(moments_ns: Stamps, wanted_ns: Stamps) -> NDArray[np.int64]:
 
 def _model(scenario: Scenario) -> Model:
     limits = LeaderLimits(scenario.leader.v_eps, scenario.leader.k_v, scenario.leader.k_u)
-    return Model(FrontEnd.WORLD, limits, ProcessNoise.by_rule(limits, scenario.estimator.turn_bandwidth))
+    return Model(
+        FrontEnd.WORLD,
+        limits,
+        ProcessNoise.by_rule(limits, scenario.estimator.turn_bandwidth, scenario.estimator.speed_bandwidth),
+    )
 
 
 def _noise(scenario: Scenario, *, emulated: bool) -> tuple[PoseNoise, float, float]:

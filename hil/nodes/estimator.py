@@ -103,7 +103,7 @@ class EstimatorNode:
         self.front_end = FrontEnd(given.front_end)
         limits = LeaderLimits(leader.v_eps, leader.k_v, leader.k_u)
         correlation = ODOMETRY_CORRELATION if given.own_motion == "odometry" else TRACK_CORRELATION
-        noise = ProcessNoise.by_rule(limits, given.turn_bandwidth)
+        noise = ProcessNoise.by_rule(limits, given.turn_bandwidth, given.speed_bandwidth)
         model = Model(self.front_end, limits, noise, input_correlation=correlation)
         settled, unsettled = settling(given.kind)
         settings = TrackSettings(

@@ -169,6 +169,8 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``turn_bandwidth``: q_u = turn_bandwidth * k_u^2 per second (0.5 agile, 0.03 gentle leaders).
     ``clock``: trusted takes the stamps of mocap frames for host time; estimated maps them to it by what is
     seen of their delays, of which ``transport_latency_s`` is known to be the way.
+    ``speed_bandwidth``: q_v = speed_bandwidth * k_v^2 per second (0.01 for leaders that drive evenly, 0.1
+    for those that stop and go every few seconds).
     ``kind`` smoother is for replays only.
     """
 
@@ -188,6 +190,7 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     input_delay_s: NonNegative = 0.0
     input_lag_s: NonNegative = 0.0
     turn_bandwidth: Positive = 0.5
+    speed_bandwidth: Positive = 0.01
     gate_probability: Annotated[float, Meta(gt=0.5, lt=1.0)] = 0.9999
     reacquire_frames: Annotated[int, Meta(ge=2)] = 5
     coast_after_s: Positive = 0.25

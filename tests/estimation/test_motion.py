@@ -191,3 +191,14 @@ def test_only_a_leader_that_stands_is_expected_to_set_off() -> None:
 def test_no_time_adds_no_noise() -> None:
     follower = FollowerMotion(0.1, 0.2, 0.01, 0.02)
     assert not process_noise_body(np.ones(5), 0.0, NOISE, follower, 0.05).any()
+
+
+def test_a_leader_that_stops_and_goes_at_random_has_the_speed_noise_of_the_rule() -> None:
+    limits, step, every = LeaderLimits(v_eps=0.04, k_v=0.1, k_u=0.7), 0.7, 5.0
+    noise = ProcessNoise.by_rule(limits, 0.5, step**2 / every)
+    generator = np.random.default_rng(8)
+    # Far longer than a sojourn the sum of the steps, taken as independent, spreads by the density times time.
+    jumps = generator.poisson(100.0 / every, 4000)
+    drift = [step * limits.k_v * generator.choice([-1.0, 1.0], count).sum() for count in jumps]
+    assert np.var(drift) / 100.0 == pytest.approx(noise.q_v, rel=0.1)
+    assert ProcessNoise.by_rule(limits, 0.5).q_v == pytest.approx((0.1 * limits.k_v) ** 2)
