@@ -15,6 +15,7 @@ COMMANDS = {
     "run": "the main job: emulated robots, estimator, controller, recorder; live or in lockstep",
     "replay": "run a log through the same steps: verify it, re-estimate it, judge it",
     "simulate": "the noise-free experiments of the paper, with pictures",
+    "bounds": "the certificate: what is guaranteed of estimates and formation, and on what it rests",
     "import": "turn other recordings into logs",
     "calibrate": "find the offsets of a range and bearing sensor that mocap has watched",
     "recover": "make a cut-off log whole",

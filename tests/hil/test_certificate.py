@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from hil.certificate import certificate_metadata, premises_of, recorded_certificate
+from hil.command_line import main
+from hil.scenario.files import load_scenario, scenario_names
+
+CONTRACT = {
+    "rates": {"M_rho", "M_alpha2"},
+    "estimates": {"M_v1", "M_alpha1"},
+    "h": {"paper", "sound"},
+    "alpha2_ultimate": {"value"},
+    "formation": {"rho_min", "rho_max", "alpha1_min", "alpha1_max"},
+    "k_u_star": {"lower", "upper"},
+}
+
+
+def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[str, str]:
+    with pytest.raises(SystemExit) as ended:
+        main(["bounds", *arguments])
+    assert ended.value.code == 0
+    told = capsys.readouterr()
+    return told.out, told.err
+
+
+def test_json_has_the_keys_of_the_contract_and_what_each_rests_on(capsys: pytest.CaptureFixture[str]) -> None:
+    out, err = printed(capsys, "turtlebot3", "--json")
+    found = json.loads(out)
+    assert not err
+    for name, keys in CONTRACT.items():
+        assert keys <= set(found[name]), name
+        assert all(isinstance(premise, str) for premise in found[name]["assumes"])
+    assert found["formation"]["rho_min"] == pytest.approx(0.157, abs=1e-3)
+    assert found["formation"]["rho_max"] == pytest.approx(0.267, abs=1e-3)
+
+
+def test_people_read_what_is_guaranteed_and_what_is_not(capsys: pytest.CaptureFixture[str]) -> None:
+    out, err = printed(capsys, "turtlebot3", "--set", "leader.k_u=1.7")
+    text = " ".join(err.split())
+    assert not out
+    assert "nothing is guaranteed: a constant turn of 1.7 rad/s" in text
+    assert "assuming [1] noise: positions within 5 sigma = 1.5 mm (motion capture)" in text
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_every_shipped_pair_has_a_certificate_that_travels_in_metadata(name: str) -> None:
+    scenario = load_scenario(name)
+    assert set(CONTRACT) <= set(recorded_certificate(certificate_metadata(scenario, driven=True)) or {})
+    assert recorded_certificate({}) is None
+
+
+def test_premises_come_from_what_the_lab_knows() -> None:
+    noisy = load_scenario("turtlebot3", ["mocap.sigma_position=0.001"])
+    assert premises_of(noisy).eps == pytest.approx(0.005)
+    lidar = load_scenario("turtlebot3", ["estimator.front_end=body", "estimator.sigma_bearing=0.1"])
+    assert premises_of(lidar).eps == pytest.approx(5.0 * 0.1 * 0.2)
+    recorded = premises_of(load_scenario("turtlebot3"), driven=False)
+    assert (recorded.speeds.lowest, recorded.speeds.highest) == (0.04, 0.1)
+    standing = load_scenario("turtlebot3", ["leader.program={kind='constant', v=0.0}"])
+    assert premises_of(standing).speeds == recorded.speeds
