@@ -25,11 +25,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from estimation.belief import Belief, Model, innovation
 from estimation.cramer_rao import TruePath, cramer_rao
 from estimation.estimate import estimate_of
+from estimation.estimator import Estimator
 from estimation.estimators import ESTIMATORS, make_estimator
+from estimation.inputs import mean_motion
 from estimation.measurement import FrontEnd, Measurement, PoseNoise, measure_world
 from estimation.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise, process_noise, propagate
 from estimation.smoother import smooth
-from estimation.tracking import Estimator, Status, Tracker, TrackSettings, mean_motion
+from estimation.tracking import Status, Tracker, TrackSettings
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
 from formation.shape import shape_of

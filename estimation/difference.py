@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from estimation.belief import Belief, Model, Rates
+from estimation.estimator import Estimator
 from estimation.measurement import FrontEnd, Measurement
 from estimation.motion import FollowerMotion, Matrix, Vector
-from estimation.tracking import Estimator
 from formation.angles import wrap
 from formation.pose import Motion
 from formation.shape import leader_velocity, polar_velocity

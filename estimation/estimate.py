@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimation.belief import Belief
 from estimation.measurement import Measurement
 from estimation.motion import Matrix, Vector
-from estimation.tracking import Status
+from estimation.screening import NO_DOUBT, Doubt
+from estimation.tracking import Status, TrackPoint
 from formation.angles import wrap
 
 QUANTITIES = ("rho_dot", "alpha2_dot", "v1", "alpha1", "u1")
@@ -24,6 +25,7 @@ class Estimate:
     u1 [rad/s]; the follower's v2 [m/s], u2 [rad/s] it rests on.
     covariance: (5, 5) of :data:`QUANTITIES`. nis: of the newest measurement, nan for a first one.
     measured_ns: capture time of the newest measurement that was used.
+    doubt: jumps that may be errors of the mocap; they are in the covariance.
     """
 
     capture_ns: int
@@ -40,10 +42,27 @@ class Estimate:
     covariance: Matrix
     nis: float
     status: Status
+    doubt: Doubt = NO_DOUBT
+
+
+def estimate_at(point: TrackPoint, status: Status) -> Estimate:
+    """Estimate at a point of a track.
+
+    A follower's pose that was not believed gives way to the one that its own motion led to.
+    """
+    measurement = point.measurement
+    if measurement.pose is not None and point.watch is not None:
+        measurement = replace(measurement, pose=point.watch.pose)
+    return estimate_of(point.belief, measurement, status, point.nis, point.used_ns, point.doubt)
 
 
 def estimate_of(
-    belief: Belief, measurement: Measurement, status: Status, nis: float, measured_ns: int
+    belief: Belief,
+    measurement: Measurement,
+    status: Status,
+    nis: float,
+    measured_ns: int,
+    doubt: Doubt = NO_DOUBT,
 ) -> Estimate:
     """Estimate at a measurement's capture time from the belief at that time.
 
@@ -52,6 +71,8 @@ def estimate_of(
     w to -e. Inserted into Eq. (7) these give v1 and alpha1 again, whatever v2 and u2 are.
     """
     mean, covariance = _in_body_frame(belief, measurement)
+    if doubt is not NO_DOUBT:
+        covariance = _doubted(mean, covariance, doubt)
     px, py, wx, wy, u1 = mean.tolist()
     v2, u2 = measurement.motion.v2, measurement.motion.u2
     rho = math.hypot(px, py)
@@ -77,7 +98,16 @@ def estimate_of(
         covariance=0.5 * (full + full.T),
         nis=nis,
         status=status,
+        doubt=doubt,
     )
+
+
+def _doubted(mean: Vector, covariance: Matrix, doubt: Doubt) -> Matrix:
+    """Covariance with a doubt about the leader's place, in every direction, and about the own heading."""
+    px, py, wx, wy, _ = mean.tolist()
+    by_heading = np.array([py, -px, wy, -wx, 0.0]) * doubt.heading
+    place = np.array([doubt.position**2, doubt.position**2, 0.0, 0.0, 0.0])
+    return covariance + by_heading[:, None] * by_heading + np.diag(place)
 
 
 def _in_body_frame(belief: Belief, measurement: Measurement) -> tuple[Vector, Matrix]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from estimation.belief import Model
-from estimation.tracking import Estimator
+from estimation.estimator import Estimator
 
 
 def _ekf(model: Model, _cutoff: float) -> Estimator:

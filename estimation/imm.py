@@ -14,9 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.belief import Belief, Model, Modes, innovation
+from estimation.estimator import Estimator
 from estimation.measurement import Measurement
 from estimation.motion import FollowerMotion, Matrix
-from estimation.tracking import Estimator
 
 TURN_BANDWIDTHS = (0.03, 0.5)
 """Turn-rate bandwidth of a gentle and of an agile leader: q_u = bandwidth * k_u^2 per second."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from estimation.motion import FollowerMotion
 
@@ -61,13 +61,16 @@ class InputTrust:
 
     sd_v2 [m/s], sd_u2 [rad/s]: its noise while the motion is steady. delay [s]: how long the motion comes
     after its signal, as the wheels follow a command. lag [s]: by how much more than that it may come later;
-    while the signal changes it is trusted that much less.
+    while the signal changes it is trusted that much less. v_max [m/s], u_max [rad/s]: what a follower may do
+    whose signal has not been heard; 0 for one that stands until then.
     """
 
     sd_v2: float
     sd_u2: float
     delay: float = 0.0
     lag: float = 0.0
+    v_max: float = 0.0
+    u_max: float = 0.0
 
 
 def follower_motion(history: History, capture_ns: int, trust: InputTrust) -> FollowerMotion:
@@ -75,12 +78,12 @@ def follower_motion(history: History, capture_ns: int, trust: InputTrust) -> Fol
 
     An input that is up to ``lag`` late is wrong by up to its change over that time, so
     sd^2 = sd_steady^2 + (largest change within lag before the capture)^2. Without any history the follower
-    is taken to stand, as before the start it does.
+    is taken to stand, as before the start it does, give or take its limits.
     """
     now_ns = capture_ns - round(trust.delay / _NS)
     now = motion_at(history, now_ns)
     if now is None:
-        return FollowerMotion(0.0, 0.0, trust.sd_v2, trust.sd_u2)
+        return FollowerMotion(0.0, 0.0, max(trust.sd_v2, trust.v_max), max(trust.sd_u2, trust.u_max))
     change_v, change_u = 0.0, 0.0
     if trust.lag > 0.0:
         since_ns = now_ns - round(trust.lag / _NS)
@@ -90,3 +93,8 @@ def follower_motion(history: History, capture_ns: int, trust: InputTrust) -> Fol
         change_u = max(abs(kept.u2 - now.u2) for kept in past)
     sd_v2, sd_u2 = math.hypot(trust.sd_v2, change_v), math.hypot(trust.sd_u2, change_u)
     return FollowerMotion(now.v2, now.u2, sd_v2, sd_u2)
+
+
+def mean_motion(a: FollowerMotion, b: FollowerMotion) -> FollowerMotion:
+    """Mean motion over an interval, from the motions at its ends (trapezoid)."""
+    return replace(b, v2=0.5 * (a.v2 + b.v2), u2=0.5 * (a.u2 + b.u2))

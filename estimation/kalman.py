@@ -6,9 +6,9 @@ import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
 
 from estimation.belief import Belief, Model
+from estimation.estimator import Estimator
 from estimation.measurement import Measurement
 from estimation.motion import STATE_SIZE, FollowerMotion, Matrix, Vector
-from estimation.tracking import Estimator
 
 _POSITION = np.eye(2, STATE_SIZE)
 

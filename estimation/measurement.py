@@ -7,7 +7,7 @@ bearing of the leader seen from the follower, and the follower's own motion).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -34,6 +34,15 @@ class PoseNoise:
 
 
 @dataclass(frozen=True, slots=True)
+class PairSeen:
+    """Both robots as one mocap frame shows them: the leader's position [m], the follower's pose."""
+
+    leader: tuple[float, float]
+    follower: Pose
+    noise: PoseNoise
+
+
+@dataclass(frozen=True, slots=True)
 class Measurement:
     """The leader's position at one capture time, and what belongs to that moment.
 
@@ -41,6 +50,7 @@ class Measurement:
     covariance: (2, 2) [m^2] of the position.
     motion: the follower's measured motion at the capture time.
     pose, pose_noise: the follower's mocap pose; None for the body front end.
+    seen: the mocap frame that all of this comes from, in either front end; None for a sighting.
     """
 
     capture_ns: int
@@ -49,6 +59,7 @@ class Measurement:
     motion: FollowerMotion
     pose: Pose | None = None
     pose_noise: PoseNoise | None = None
+    seen: PairSeen | None = None
 
 
 def measure_world(
@@ -56,7 +67,8 @@ def measure_world(
 ) -> Measurement:
     """World front end: the leader's mocap position, with covariance sigma_p^2 I."""
     covariance = noise.position**2 * _UNIT
-    return Measurement(capture_ns, np.array(leader), covariance, motion, follower, noise)
+    seen = PairSeen(leader, follower, noise)
+    return Measurement(capture_ns, np.array(leader), covariance, motion, follower, noise, seen)
 
 
 def measure_body(
@@ -82,4 +94,6 @@ def measure_body_from_mocap(
     dx, dy = leader[0] - follower.x, leader[1] - follower.y
     rho, alpha2 = math.hypot(dx, dy), math.atan2(dy, dx) - follower.theta
     sd_rho = math.sqrt(2.0) * noise.position
-    return measure_body(capture_ns, rho, alpha2, sd_rho, math.hypot(sd_rho / rho, noise.heading), motion)
+    sd_alpha2 = math.hypot(sd_rho / rho, noise.heading)
+    measured = measure_body(capture_ns, rho, alpha2, sd_rho, sd_alpha2, motion)
+    return replace(measured, seen=PairSeen(leader, follower, noise))

@@ -16,10 +16,10 @@ from itertools import pairwise
 import numpy as np
 
 from estimation.belief import Belief, Model
+from estimation.estimator import Estimator
 from estimation.measurement import Measurement
 from estimation.memory import Horizon, Stage
 from estimation.motion import STATE_SIZE, FollowerMotion, Matrix, Vector
-from estimation.tracking import Estimator
 
 _AT_ONCE = FollowerMotion(0.0, 0.0, 0.0, 0.0)
 _NO_DRIVE = np.zeros((STATE_SIZE, STATE_SIZE))

@@ -9,11 +9,11 @@ import numpy as np
 
 from estimation import motion
 from estimation.belief import Belief, Model
+from estimation.estimator import Estimator
 from estimation.measurement import FrontEnd, Measurement
 from estimation.memory import Guess, ShapeState
 from estimation.motion import FollowerMotion, Matrix, Vector
 from estimation.shape_motion import cartesian, drive_through, range_and_bearing
-from estimation.tracking import Estimator
 from formation.angles import wrap
 from formation.pose import Pose, advance
 

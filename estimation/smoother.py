@@ -12,9 +12,10 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.belief import Belief
+from estimation.inputs import mean_motion
 from estimation.measurement import Measurement
 from estimation.motion import STATE_SIZE
-from estimation.tracking import Tracker, TrackPoint, Verdict, mean_motion
+from estimation.tracking import Tracker, TrackPoint, Verdict
 
 _NS = 1e-9
 

@@ -1,4 +1,4 @@
-"""From measurements in any order to a belief with a status: gate, re-acquisition, coasting, rewind ring.
+"""From measurements in any order to a belief with a status: gates, re-acquisition, coasting, rewind ring.
 
 A track is a fold: ``point = follow(point, measurement)`` in the order of capture times. A ring of the last
 points lets a late measurement be folded in where it belongs, so that the result is what delivery in order
@@ -9,13 +9,25 @@ from __future__ import annotations
 
 import bisect
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
-from typing import Protocol
 
-from estimation.belief import Belief, Model, innovation
+from estimation.belief import Belief
+from estimation.candidate import Candidate, jump, nursed, turned
+from estimation.estimator import Estimator
+from estimation.inputs import mean_motion
 from estimation.measurement import Measurement
-from estimation.motion import FollowerMotion
+from estimation.screening import (
+    NO_DOUBT,
+    STANDING,
+    Cause,
+    Doubt,
+    Watch,
+    carried,
+    cause_of,
+    looked_at,
+    watch_from,
+)
 
 _NS = 1e-9
 
@@ -24,7 +36,7 @@ class Status(IntEnum):
     """How far an estimate can be trusted; only TRACKING may move a robot.
 
     INITIALISING: speed and bearing of the leader are not yet known well enough. TRACKING: all well.
-    COASTING: no measurement for a while. REJECTING: the newest measurement did not pass the gate.
+    COASTING: no measurement for a while. REJECTING: the newest measurement did not pass the gates.
     LOST: nothing usable for so long that the next measurement starts anew.
     """
 
@@ -45,43 +57,15 @@ class Verdict(Enum):
     DUPLICATE = "duplicate"
 
 
-class Estimator(Protocol):
-    """A recursive estimator: pure, its whole state is the belief.
-
-    Those that derive from it have ``step`` out of their ``predict`` and ``update``.
-    """
-
-    model: Model
-
-    def start(self, measurement: Measurement) -> Belief:
-        """Belief from the first measurement alone."""
-
-    def predict(self, belief: Belief, dt: float, follower: FollowerMotion) -> Belief:
-        """Belief after dt [s], the follower having moved as given."""
-
-    def update(self, belief: Belief, measurement: Measurement) -> Belief:
-        """Belief after a measurement at the belief's time."""
-
-    def step(
-        self, belief: Belief, dt: float, follower: FollowerMotion, measurement: Measurement, gate: float
-    ) -> tuple[Belief, float]:
-        """Belief after dt [s] and a measurement at the end of it, and the NIS of this measurement.
-
-        One whose NIS is above ``gate`` is left out: the belief is then the prediction.
-        """
-        prior = self.predict(belief, dt, follower)
-        nis = innovation(prior, measurement).nis
-        return (self.update(prior, measurement) if nis <= gate else prior), nis
-
-
 @dataclass(frozen=True, slots=True)
 class TrackSettings:
     """When to believe a measurement and when to believe the estimate.
 
-    gate_probability: share of good measurements that pass the chi-square gate.
+    gate_probability: share of good measurements that pass a chi-square gate.
     reacquire_frames: rejected measurements that must agree with each other before they take over.
-    coast_after, lost_after, window: [s]. settled_heading, unsettled_heading: standard deviation of the
-    leader's direction [rad] below which a track settles, and above which it no longer counts as settled.
+    coast_after, lost_after, window: [s]. doubt_for: how long [s] a jump stays in doubt.
+    settled_heading, unsettled_heading: standard deviation of the leader's direction [rad] below which a track
+    settles, and above which it no longer counts as settled.
     """
 
     gate_probability: float = 0.9999
@@ -89,23 +73,19 @@ class TrackSettings:
     coast_after: float = 0.25
     lost_after: float = 1.0
     window: float = 0.2
+    doubt_for: float = 2.0
     settled_heading: float = 0.25
     unsettled_heading: float = 0.6
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
-    """A second belief made of rejected measurements only, waiting for enough of them to agree."""
-
-    belief: Belief
-    capture_ns: int
-    motion: FollowerMotion
-    frames: int
-
-
-@dataclass(frozen=True, slots=True)
 class TrackPoint:
-    """The track right after one measurement. ``used_ns``: capture time of the newest one that was used."""
+    """The track right after one measurement.
+
+    ``used_ns``: capture time of the newest one that was used. ``watch``: what the screen of the follower's
+    pose knows, None while no mocap frame has come. ``cause``: why the measurement was not used, if so.
+    ``doubt``: jumps that were followed of late.
+    """
 
     measurement: Measurement
     belief: Belief
@@ -114,6 +94,9 @@ class TrackPoint:
     used_ns: int
     settled: bool
     candidate: Candidate | None = None
+    watch: Watch | None = None
+    cause: Cause | None = None
+    doubt: Doubt = NO_DOUBT
 
 
 Track = tuple[TrackPoint, ...]
@@ -153,29 +136,59 @@ class Tracker:
 
     def begin(self, measurement: Measurement) -> TrackPoint:
         """First point of a track that knows nothing but this measurement."""
-        belief = self.estimator.start(measurement)
         return TrackPoint(
-            measurement, belief, Verdict.RESTARTED, math.nan, measurement.capture_ns, settled=False
+            measurement,
+            self.estimator.start(measurement),
+            Verdict.RESTARTED,
+            math.nan,
+            measurement.capture_ns,
+            settled=False,
+            watch=None if measurement.seen is None else watch_from(measurement.seen),
         )
 
     def follow(self, last: TrackPoint, measurement: Measurement) -> TrackPoint:
-        """Fold one measurement, newer than the point, into it."""
-        dt = (measurement.capture_ns - last.measurement.capture_ns) * _NS
+        """Fold one measurement, newer than the point, into it.
+
+        It is used if the leader passes the gate and the frame the screen. If not, it joins the candidate,
+        which takes over when enough measurements agree and the jump is small against the distance: more than
+        that no robot does, and it has time until the track is lost.
+        """
         if (measurement.capture_ns - last.used_ns) * _NS > self.settings.lost_after:
-            return self.begin(measurement)
-        follower = mean_motion(last.measurement.motion, measurement.motion)
-        belief, nis = self.estimator.step(last.belief, dt, follower, measurement, self._gate)
-        if nis <= self._gate:
-            settled = self.settled(belief, last.settled)
-            return TrackPoint(measurement, belief, Verdict.USED, nis, measurement.capture_ns, settled)
-        candidate = self._nurse(last.candidate, measurement)
-        if candidate.frames >= self.settings.reacquire_frames:
-            settled = self.settled(candidate.belief, before=False)
-            return TrackPoint(
-                measurement, candidate.belief, Verdict.RESTARTED, nis, measurement.capture_ns, settled
-            )
+            return self._found(last, measurement)
+        dt = (measurement.capture_ns - last.measurement.capture_ns) * _NS
+        watch, cause = self._screened(last, measurement, dt)
+        # Nothing passes a negative gate: the belief is then the prediction.
+        gate = self._gate if cause is None else -1.0
+        motion = mean_motion(last.measurement.motion, measurement.motion)
+        belief, nis = self.estimator.step(last.belief, dt, motion, measurement, gate)
         settled = self.settled(belief, last.settled)
-        return TrackPoint(measurement, belief, Verdict.GATED, nis, last.used_ns, settled, candidate)
+        doubt = self._lasting(last.doubt, measurement.capture_ns)
+        if nis <= gate:
+            return TrackPoint(
+                measurement,
+                belief,
+                Verdict.USED,
+                nis,
+                measurement.capture_ns,
+                settled,
+                watch=watch,
+                doubt=doubt,
+            )
+        rejected = TrackPoint(
+            measurement,
+            belief,
+            Verdict.GATED,
+            nis,
+            last.used_ns,
+            settled,
+            None
+            if cause is Cause.FROZEN
+            else nursed(last.candidate, measurement, self.estimator, self._gate),
+            watch,
+            cause or Cause.GATED,
+            doubt,
+        )
+        return self._taken_over(rejected) or rejected
 
     def status(self, track: Track, now_ns: int) -> Status:
         """Status of the track's newest point for one who looks at it at ``now_ns``."""
@@ -191,15 +204,67 @@ class Tracker:
             return Status.COASTING
         return Status.TRACKING if newest.settled else Status.INITIALISING
 
-    def _nurse(self, candidate: Candidate | None, measurement: Measurement) -> Candidate:
-        """Let a rejected measurement join the candidate, or start a new one if they do not agree."""
-        if candidate is not None:
-            dt = (measurement.capture_ns - candidate.capture_ns) * _NS
-            follower = mean_motion(candidate.motion, measurement.motion)
-            belief, nis = self.estimator.step(candidate.belief, dt, follower, measurement, self._gate)
-            if nis <= self._gate:
-                return Candidate(belief, measurement.capture_ns, measurement.motion, candidate.frames + 1)
-        return Candidate(self.estimator.start(measurement), measurement.capture_ns, measurement.motion, 1)
+    def _found(self, last: TrackPoint, measurement: Measurement) -> TrackPoint:
+        """Start anew after a loss: with the candidate if it is ripe, unless the frame is plainly wrong.
+
+        What was lost is not moved on, so that a body that stays frozen leads nowhere.
+        """
+        dt = (measurement.capture_ns - last.measurement.capture_ns) * _NS
+        watch, cause = self._screened(last, measurement, dt)
+        if cause in STANDING:
+            return replace(
+                last, measurement=measurement, verdict=Verdict.GATED, nis=math.nan, settled=False,
+                candidate=None, watch=watch, cause=cause,
+            )  # fmt: skip
+        begun = self.begin(measurement)
+        candidate = nursed(last.candidate, measurement, self.estimator, self._gate)
+        if candidate.frames < self.settings.reacquire_frames:
+            return begun
+        return replace(begun, belief=candidate.belief, settled=self.settled(candidate.belief, before=False))
+
+    def _screened(
+        self, last: TrackPoint, measurement: Measurement, dt: float
+    ) -> tuple[Watch | None, Cause | None]:
+        """Watch at the measurement, and what there is against its frame; a sighting has none."""
+        seen, watch = measurement.seen, last.watch
+        if watch is not None:
+            watch = carried(watch, last.measurement.motion, measurement.motion, dt)
+        if seen is None:
+            return watch, None
+        if watch is None:
+            return watch_from(seen), None
+        leader_moves = last.belief.speed >= 0.5 * self.estimator.model.limits.v_eps
+        watch, off = looked_at(watch, seen, self._gate, leader_moves=leader_moves)
+        return watch, cause_of(watch, off, self._gate)
+
+    def _taken_over(self, rejected: TrackPoint) -> TrackPoint | None:
+        """Point of a candidate that takes over, in doubt by its jump; None if it is not ripe or goes too far.
+
+        Too far is what would turn the line between the robots, and with it alpha1 and alpha2, by more than
+        the angle that a track may be uncertain by to settle.
+        """
+        candidate, measurement = rejected.candidate, rejected.measurement
+        if candidate is None or candidate.frames < self.settings.reacquire_frames:
+            return None
+        prior, leader_fits = rejected.belief, rejected.nis <= self._gate
+        doubt = jump(rejected.doubt, measurement, prior, rejected.watch, leader_fits=leader_fits)
+        if turned(doubt, measurement) > self.settings.settled_heading:
+            return None
+        belief = self.estimator.update(prior, measurement) if leader_fits else candidate.belief
+        return TrackPoint(
+            measurement,
+            belief,
+            Verdict.RESTARTED,
+            rejected.nis,
+            measurement.capture_ns,
+            self.settled(belief, before=leader_fits and rejected.settled),
+            watch=candidate.watch or rejected.watch,
+            doubt=doubt,
+        )
+
+    def _lasting(self, doubt: Doubt, now_ns: int) -> Doubt:
+        """Doubt as it is now: a body that has stayed where it jumped for long enough is there."""
+        return doubt if (now_ns - doubt.since_ns) * _NS <= self.settings.doubt_for else NO_DOUBT
 
     def settled(self, belief: Belief, before: bool) -> bool:
         """Whether the leader's direction is known well enough, for a track that was settled before or not."""
@@ -218,6 +283,6 @@ class Tracker:
         return track[first - 1 :] if first > 1 else track
 
 
-def mean_motion(a: FollowerMotion, b: FollowerMotion) -> FollowerMotion:
-    """Mean motion over an interval, from the motions at its ends (trapezoid)."""
-    return FollowerMotion(0.5 * (a.v2 + b.v2), 0.5 * (a.u2 + b.u2), b.sd_v2, b.sd_u2)
+def cause_at(track: Track, capture_ns: int) -> Cause | None:
+    """Why the measurement of a capture time was not used; None if it was, or the track does not have it."""
+    return next((point.cause for point in track if point.measurement.capture_ns == capture_ns), None)

@@ -10,7 +10,7 @@ from msgspec import Struct, field
 from msgspec.structs import replace
 
 from estimation.belief import Model
-from estimation.estimate import Estimate, estimate_of
+from estimation.estimate import Estimate, estimate_at
 from estimation.estimators import make_estimator, settling
 from estimation.host_time import HostTime
 from estimation.inputs import History, InputTrust, follower_motion, remember
@@ -31,7 +31,8 @@ from estimation.own_motion import (
     fold,
     own_motion,
 )
-from estimation.tracking import Status, Track, Tracker, TrackSettings, Verdict
+from estimation.screening import Cause
+from estimation.tracking import Status, Track, Tracker, TrackSettings, Verdict, cause_at
 from formation.angles import wrap
 from formation.pose import Pose
 from hil.nodes.frame_time import FrameTime
@@ -66,6 +67,13 @@ REASONS = {
     Status.COASTING: "no measurement of late",
     Status.REJECTING: "newest measurement outside the gate",
     Status.LOST: "no usable measurement for too long",
+}
+REJECTIONS = {
+    Cause.GATED: REASONS[Status.REJECTING],
+    Cause.FOLLOWER: "follower not where its own motion took it",
+    Cause.FLIPPED: "follower's heading turned round",
+    Cause.SWAPPED: "leader and follower have changed places",
+    Cause.FROZEN: "last pose of a moving body repeated",
 }
 
 
@@ -116,7 +124,14 @@ class EstimatorNode:
             unsettled_heading=unsettled,
         )
         self.tracker = Tracker(make_estimator(given.kind, model, given.difference_cutoff_s), settings)
-        self.trust = InputTrust(given.sigma_v2, given.sigma_u2, given.input_delay_s, given.input_lag_s)
+        self.trust = InputTrust(
+            given.sigma_v2,
+            given.sigma_u2,
+            given.input_delay_s,
+            given.input_lag_s,
+            scenario.controller.v_max,
+            scenario.controller.u_max,
+        )
         self.pose_noise = PoseNoise(given.sigma_position, given.sigma_heading)
         self.own_noise = OwnNoise(self.pose_noise, scenario.controller.v_max, scenario.controller.u_max)
         self.assumed = AssumedErrors.of(scenario)
@@ -159,9 +174,7 @@ class EstimatorNode:
         """Newest estimate, its status as seen at ``now_ns``."""
         if not state.track:
             return None
-        newest = state.track[-1]
-        status = self.tracker.status(state.track, now_ns)
-        return estimate_of(newest.belief, newest.measurement, status, newest.nis, newest.used_ns)
+        return estimate_at(state.track[-1], self.tracker.status(state.track, now_ns))
 
     def _on_frame(self, state: EstimatorState, payload: bytes, now_ns: int) -> EstimatorState:
         frame = read_frame(payload, self.topics.leader, self.topics.follower)
@@ -221,7 +234,8 @@ class EstimatorNode:
             track = self._retold(state.track, measurement, own) if late else track
             state = replace(state, own=own)
         if verdict in (Verdict.DUPLICATE, Verdict.LATE, Verdict.GATED):
-            state = replace(state, refused=counted(state.refused, verdict.value))
+            cause = cause_at(track, measurement.capture_ns) if verdict is Verdict.GATED else None
+            state = replace(state, refused=counted(state.refused, (cause or verdict).value))
         else:
             state = replace(state, taken=counted(state.taken, "used"))
         if late and verdict is not Verdict.DUPLICATE:
@@ -242,7 +256,7 @@ class EstimatorNode:
         estimate = self.estimate(state, now_ns)
         if estimate is None:
             return state, ()
-        reason = REASONS[estimate.status]
+        reason = reason_for(estimate.status, state.track)
         message = to_message(estimate, now_ns, self.topics.follower, reason, self.assumed, state.receipts)
         out = outgoing(self.topics.estimate, message, estimate.capture_ns)
         return replace(state, receipts=(), last_out_ns=now_ns), (out,)
@@ -267,3 +281,9 @@ class EstimatorNode:
         values |= self.frame_time.report(state.times)
         values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
+
+
+def reason_for(status: Status, track: Track) -> str:
+    """Why an estimate does not have the status TRACKING; empty if it has."""
+    cause = track[-1].cause
+    return REJECTIONS[cause] if status is Status.REJECTING and cause is not None else REASONS[status]

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from estimation import kernels
 from estimation.belief import Belief, Model, innovation
 from estimation.compiled import CompiledExtended, CompiledUnscented
+from estimation.estimator import Estimator
 from estimation.kalman import ExtendedFilter, UnscentedFilter
 from estimation.measurement import FrontEnd, Measurement
 from estimation.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise, Vector
-from estimation.tracking import Estimator
 
 LIMITS = LeaderLimits(v_eps=0.04, k_v=0.3, k_u=0.7)
 WORLD = Model(FrontEnd.WORLD, LIMITS, ProcessNoise.by_rule(LIMITS, 0.5))

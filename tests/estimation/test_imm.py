@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from estimation.belief import Belief, Model, Modes, innovation
+from estimation.estimator import Estimator
 from estimation.imm import TURN_BANDWIDTHS, InteractingModels, mixture
 from estimation.kalman import ExtendedFilter
 from estimation.measurement import FrontEnd, Measurement
@@ -18,7 +19,6 @@ from estimation.motion import (
     process_noise,
     propagate,
 )
-from estimation.tracking import Estimator
 
 DT = 1.0 / 120.0
 SIGMA = 1e-3

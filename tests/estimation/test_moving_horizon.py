@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from estimation.belief import Belief, Model, innovation
+from estimation.estimator import Estimator
 from estimation.kalman import ExtendedFilter
 from estimation.measurement import FrontEnd, Measurement
 from estimation.memory import Horizon
 from estimation.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise, process_noise, propagate
 from estimation.moving_horizon import MovingHorizon
-from estimation.tracking import Estimator
 
 DT = 1.0 / 120.0
 SIGMA = 1e-3

@@ -7,6 +7,7 @@ import pytest
 
 from estimation.belief import Belief, Model, innovation
 from estimation.estimate import Estimate, estimate_of
+from estimation.estimator import Estimator
 from estimation.kalman import ExtendedFilter
 from estimation.measurement import (
     FrontEnd,
@@ -18,7 +19,7 @@ from estimation.measurement import (
 from estimation.memory import Guess, ShapeState
 from estimation.motion import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.shape_filter import ShapeFilter
-from estimation.tracking import Estimator, Status
+from estimation.tracking import Status
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
 from formation.shape import Shape, shape_of

@@ -166,7 +166,7 @@ def test_nothing_is_carried_back_over_a_restart_or_out_of_an_outlier() -> None:
     generator = np.random.default_rng(4)
     seen, _ = followed(generator, random_leader(generator, 240), FrontEnd.WORLD)
     wild = replace(seen[60], position=seen[60].position + np.array([0.2, 0.1]))
-    jumped = [replace(each, position=each.position + np.array([1.0, -1.0])) for each in seen[120:]]
+    jumped = [replace(each, position=each.position + np.array([0.05, -0.05])) for each in seen[120:]]
     points = smooth(tracker(), [*seen[:60], wild, *seen[61:120], *jumped])
     assert points[60].verdict is Verdict.GATED
     assert points[60].belief.mean[:2] == pytest.approx(seen[60].position, abs=5e-3)

@@ -230,11 +230,11 @@ def test_single_outliers_are_gated_and_forgotten(kind: str, front_end: FrontEnd)
 
 
 @pytest.mark.parametrize(("kind", "front_end"), CASES)
-def test_a_body_that_jumped_is_taken_up_again_after_some_frames_that_agree(
+def test_a_leader_that_jumped_a_little_is_taken_up_again_after_some_frames_that_agree(
     kind: str, front_end: FrontEnd
 ) -> None:
     run = drive(front_end, 8, 420)
-    jumped = [moved(m, 0.5, -0.3) if k >= 150 else m for k, m in enumerate(run.measurements)]
+    jumped = [moved(m, 0.05, -0.03) if k >= 150 else m for k, m in enumerate(run.measurements)]
     of = tracker(kind, front_end, TrackSettings(reacquire_frames=5))
     track, verdicts = folded(of, jumped)
     # In the body frame the offset of a real body would turn with the follower: it drifts, but does not jump.
@@ -244,11 +244,28 @@ def test_a_body_that_jumped_is_taken_up_again_after_some_frames_that_agree(
 
 
 @pytest.mark.parametrize(("kind", "front_end"), CASES)
+def test_one_that_jumped_far_is_given_time_to_come_back_until_it_is_lost(
+    kind: str, front_end: FrontEnd
+) -> None:
+    run = drive(front_end, 8, 420)
+    jumped = [moved(m, 0.5, -0.3) if k >= 150 else m for k, m in enumerate(run.measurements)]
+    of = tracker(kind, front_end)
+    for back in (200, 260):
+        track, verdicts = folded(of, jumped[:back] + run.measurements[back : back + 60])
+        assert set(verdicts[150:back]) == {Verdict.GATED}
+        assert verdicts[back:].count(Verdict.GATED) <= 5
+        assert status_now(of, track) is Status.TRACKING
+    track, verdicts = folded(of, jumped)
+    assert verdicts[150:271] == [Verdict.GATED] * 120 + [Verdict.RESTARTED]
+    assert status_now(of, track) is Status.TRACKING
+
+
+@pytest.mark.parametrize(("kind", "front_end"), CASES)
 def test_after_a_jump_it_is_not_settled_until_it_knows_the_direction_again(
     kind: str, front_end: FrontEnd
 ) -> None:
     run = drive(front_end, 8, 186, noise=COARSE)
-    jumped = [moved(m, 0.5, -0.3) if k >= 180 else m for k, m in enumerate(run.measurements)]
+    jumped = [moved(m, 0.05, -0.03) if k >= 180 else m for k, m in enumerate(run.measurements)]
     of = tracker(kind, front_end)
     track, verdicts = folded(of, jumped)
     assert Verdict.RESTARTED in verdicts[180:]

@@ -76,7 +76,11 @@ def estimates(sent: Sequence[Outgoing]) -> list[msg.LeaderEstimate]:
 
 WARM, _ = fed(drive(60))
 WARM_NS = EPOCH_NS + 60 * FRAME_NS + LATENCY_NS
-PAIR = [("leader", Pose(0.3, 0.04, 1.5)), ("follower", Pose(0.7, 0.15, 1.6))]
+WARM_S = 60 * FRAME_NS * 1e-9
+PAIR = [
+    ("leader", advance(Pose(0.3, 0.0, 1.5), 0.08, 0.3, WARM_S)),
+    ("follower", advance(Pose(0.7, 0.1, 1.6), 0.1, 0.2, WARM_S)),
+]
 
 
 @pytest.mark.parametrize("kind", ESTIMATORS)
