@@ -12,7 +12,9 @@ from scipy.optimize import root
 from formation.angles import FloatArray, wrap
 from formation.closed_loop import FollowerLaw, integrate
 from formation.leader import LeaderProgram
-from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2, Shape, reduced_rates
+from formation.pose import Motion
+from formation.shape import Shape, shape_rates
+from formation.station import ABREAST, Station
 
 RELAXING_PERIODS = 10
 SAMPLES_PER_PERIOD = 2000
@@ -28,7 +30,7 @@ PeriodMap = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True, slots=True)
 class PeriodicOrbit:
-    """One period of the reduced system (5), that is on the manifold alpha2 = pi/2.
+    """One period of the reduced system (5), that is on the manifold alpha2 = pi/2 (or the station's).
 
     Arrays of shape (n,) over one period, first and last row the same state: ``t`` from 0 to ``period``,
     ``rho``, ``alpha1`` (wrapped), ``v2``. ``multipliers``: the two Floquet multipliers, largest modulus
@@ -49,10 +51,13 @@ class PeriodicOrbit:
         return abs(self.multipliers[0])
 
 
-def find_orbit(program: LeaderProgram, law: FollowerLaw, rho_guess: float) -> PeriodicOrbit | None:
-    """Find the periodic orbit near the abreast formation at distance ``rho_guess``, by shooting.
+def find_orbit(
+    program: LeaderProgram, law: FollowerLaw, rho_guess: float, station: Station = ABREAST
+) -> PeriodicOrbit | None:
+    """Find the periodic orbit near the station at distance ``rho_guess``, by shooting.
 
-    The period map of the reduced system is followed for a few periods from (rho_guess, -pi/2), then its
+    The period map of the reduced system is followed for a few periods from (rho_guess, -pi/2), or the
+    station's alpha1, then its
     fixed point is solved for in (ln rho, alpha1), in which rho stays positive. The multipliers are the
     eigenvalues of the map's derivative there, by central differences. None if the program has no period or no
     fixed point is found, as for a leader that turns harder on average than the law can hold.
@@ -63,17 +68,17 @@ def find_orbit(program: LeaderProgram, law: FollowerLaw, rho_guess: float) -> Pe
     ends = np.array([0.0, period])
 
     def period_map(point: FloatArray) -> FloatArray:
-        end: FloatArray = _follow(program, law, point, ends)[-1]
+        end: FloatArray = _follow(program, law, station, point, ends)[-1]
         return end
 
     try:
-        fixed = _fixed_point(period_map, np.array([math.log(rho_guess), ABREAST_ALPHA1]))
+        fixed = _fixed_point(period_map, np.array([math.log(rho_guess), station.alpha1]))
         if fixed is None:
             return None
         multipliers = _multipliers(period_map, fixed)
         if min(abs(1.0 - multiplier) for multiplier in multipliers) < _ISOLATED:
             return None
-        return _orbit(program, law, fixed, period, multipliers)
+        return _orbit(program, law, station, fixed, period, multipliers)
     except ArithmeticError:
         return None
 
@@ -88,21 +93,22 @@ def _fixed_point(period_map: PeriodMap, point: FloatArray) -> FloatArray | None:
     return fixed if max(map(abs, displacement(fixed))) <= _CLOSED else None
 
 
-def _follow(program: LeaderProgram, law: FollowerLaw, point: FloatArray, times: FloatArray) -> FloatArray:
+def _follow(
+    program: LeaderProgram, law: FollowerLaw, station: Station, point: FloatArray, times: FloatArray
+) -> FloatArray:
     """States (ln rho, alpha1) of the reduced system at the given times."""
 
-    def rates(t: float, state: FloatArray) -> tuple[float, ...]:
+    def state_rates(t: float, state: FloatArray) -> tuple[float, ...]:
         driven = program(t)
-        shape = _on_manifold(state)
-        v2 = law(shape, driven.v, driven.u).v
-        rho_dot, alpha1_dot = reduced_rates(shape.rho, shape.alpha1, driven, v2)
-        return rho_dot / shape.rho, alpha1_dot
+        shape = _on_manifold(state, station)
+        rates = shape_rates(shape, driven, Motion(law(shape, driven.v, driven.u).v, 0.0))
+        return rates.rho_dot / shape.rho, rates.alpha1_dot
 
-    return integrate(rates, point, times, program.longest_step)
+    return integrate(state_rates, point, times, program.longest_step)
 
 
-def _on_manifold(state: FloatArray) -> Shape:
-    return Shape(math.exp(state[0]), wrap(float(state[1])), ABREAST_ALPHA2)
+def _on_manifold(state: FloatArray, station: Station) -> Shape:
+    return Shape(math.exp(state[0]), wrap(float(state[1])), station.alpha2)
 
 
 def _multipliers(period_map: PeriodMap, fixed: FloatArray) -> tuple[complex, complex]:
@@ -115,14 +121,15 @@ def _multipliers(period_map: PeriodMap, fixed: FloatArray) -> tuple[complex, com
 def _orbit(
     program: LeaderProgram,
     law: FollowerLaw,
+    station: Station,
     fixed: FloatArray,
     period: float,
     multipliers: tuple[complex, complex],
 ) -> PeriodicOrbit:
     times = np.linspace(0.0, period, SAMPLES_PER_PERIOD + 1)
-    states = _follow(program, law, fixed, times)
+    states = _follow(program, law, station, fixed, times)
     speeds = [
-        law(_on_manifold(state), driven.v, driven.u).v
+        law(_on_manifold(state, station), driven.v, driven.u).v
         for state, driven in zip(states, map(program, times.tolist()), strict=True)
     ]
     return PeriodicOrbit(

@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from formation.angles import FloatArray
 from formation.shape import Shape
+from formation.station import ABREAST, Station
 
 Number = TypeVar("Number", float, FloatArray)
 
@@ -46,9 +47,11 @@ class Spacing:
         return 2.0 * self.mu_rho * ratio * ratio / rho
 
 
-def lyapunov(shape: Shape, spacing: Spacing) -> float:
+def lyapunov(shape: Shape, spacing: Spacing, station: Station = ABREAST) -> float:
     """V1 = 1 + sin(alpha1) + g(rho) of the proof of Prop. 1: zero only abreast at rho_0 on the right.
 
-    V1 < 2 is the region of attraction that the proof covers; the true one is larger.
+    V1 < 2 is the region of attraction that the proof covers; the true one is larger. For another station
+    1 - cos of the angle by which alpha1 is off, and g weighted with the sine of the bearing.
     """
-    return 1.0 + math.sin(shape.alpha1) + spacing.g(shape.rho)
+    aligned = math.cos(shape.alpha1) * station.cos + math.sin(shape.alpha1) * station.sin
+    return 1.0 + aligned + abs(station.sin) * spacing.g(shape.rho)

@@ -41,7 +41,7 @@ def simulate(scenario: Scenario, out: Path | None) -> dict[str, object]:
     except IntegrationError as error:
         raise CheckFailedError(f"scenario {scenario.name}: {error}; check gains and start poses") from error
     program, law = scenario_parts.leader_program(scenario), scenario_parts.follower_law(scenario)
-    orbit = find_orbit(program, law, scenario.formation.rho_0)
+    orbit = find_orbit(program, law, scenario.formation.rho_0, scenario_parts.station(scenario))
     if out is not None:
         _write(scenario, trajectory, orbit, out)
     return _report(scenario, trajectory, orbit)
@@ -54,7 +54,7 @@ def _sample_times(duration: float) -> FloatArray:
 
 def _report(scenario: Scenario, trajectory: Trajectory, orbit: PeriodicOrbit | None) -> dict[str, object]:
     start, final = trajectory.shape_at(0), trajectory.shape_at(-1)
-    V1_initial = lyapunov(start, scenario_parts.gains(scenario).spacing)
+    V1_initial = lyapunov(start, scenario_parts.gains(scenario).spacing, scenario_parts.station(scenario))
     report: dict[str, object] = {
         "final": {"rho": final.rho, "alpha1": final.alpha1, "alpha2": final.alpha2},
     }

@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from estimation.bounds import Values
 from estimation.estimate import QUANTITIES
 from formation.angles import FloatArray, wrap
-from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2
 from hil.figures.panel_strokes import (
     BELIEVED,
     LIMIT,
@@ -22,6 +21,7 @@ from hil.figures.panel_strokes import (
 )
 from hil.figures.robot_drawing import FOLLOWER
 from hil.figures.shown import Shown, broken_at_jumps, with_gaps
+from hil.scenario.parts import station
 
 TRUE, ORBIT = "#3c3c3c", "#7a5fa8"
 _FARTHEST = 4.0
@@ -38,14 +38,14 @@ def draw_distance(axes: Axes, shown: Shown) -> None:
 
 def draw_alpha1(axes: Axes, shown: Shown) -> None:
     """Bearing of the follower from the leader, as :func:`draw_distance`."""
-    _draw_desired(axes, shown, ABREAST_ALPHA1, r"$-\pi/2$")
+    _draw_desired(axes, shown, station(shown.evidence.scenario).alpha1, "desired")
     _draw_shape(axes, shown, shown.columns.truth.alpha1, shown.tracked.seen.alpha1, 1)
     axes.set_ylabel(r"$\alpha_1$ [rad]")
 
 
 def draw_alpha2(axes: Axes, shown: Shown) -> None:
     """Bearing of the leader from the follower, as :func:`draw_distance`."""
-    _draw_desired(axes, shown, ABREAST_ALPHA2, r"$\pi/2$")
+    _draw_desired(axes, shown, station(shown.evidence.scenario).alpha2, "desired")
     _draw_shape(axes, shown, shown.columns.truth.alpha2, shown.tracked.seen.alpha2, 2)
     axes.set_ylabel(r"$\alpha_2$ [rad]")
 

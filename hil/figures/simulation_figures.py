@@ -17,6 +17,7 @@ from formation.angles import FloatArray
 from formation.closed_loop import Trajectory
 from formation.periodic_orbit import PeriodicOrbit
 from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2
+from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 
 LEADER, FOLLOWER = "#1f5fa8", "#d9741a"
@@ -44,9 +45,9 @@ def draw_simulation(
     middle = grid[:, 1].subgridspec(3, 1, height_ratios=(0.05, 1.0, 0.13))
     polar = figure.add_subplot(middle[1], projection="polar")
     assert isinstance(polar, PolarAxes)
-    draw_polar(polar, trajectory, orbit, scenario.formation.rho_0)
+    draw_polar(polar, scenario, trajectory, orbit)
     rows = [figure.add_subplot(grid[row, 2]) for row in range(3)]
-    draw_bearings(rows[0], trajectory)
+    draw_bearings(rows[0], scenario, trajectory)
     draw_speed(rows[1], scenario, trajectory)
     draw_turn_rate(rows[2], scenario, trajectory)
     _share_time(rows, trajectory)
@@ -60,7 +61,7 @@ def draw_experiment(scenario: Scenario, trajectory: Trajectory, path: Path) -> N
     draw_tracks(figure.add_subplot(grid[:, 0]), trajectory, scenario.formation.rho_0)
     rows = [figure.add_subplot(grid[row, 1]) for row in range(4)]
     draw_distance(rows[0], trajectory, scenario.formation.rho_0)
-    draw_bearings(rows[1], trajectory)
+    draw_bearings(rows[1], scenario, trajectory)
     draw_speed(rows[2], scenario, trajectory)
     draw_turn_rate(rows[3], scenario, trajectory)
     _share_time(rows, trajectory)
@@ -86,12 +87,15 @@ def draw_tracks(axes: Axes, trajectory: Trajectory, rho_0: float) -> None:
     axes.legend(loc="best", frameon=False, fontsize=9)
 
 
-def draw_polar(axes: PolarAxes, trajectory: Trajectory, orbit: PeriodicOrbit | None, rho_0: float) -> None:
+def draw_polar(
+    axes: PolarAxes, scenario: Scenario, trajectory: Trajectory, orbit: PeriodicOrbit | None
+) -> None:
     """Shape in the plane: radius rho / rho_0 at angle alpha1 (of the follower) and alpha2 (of the leader)."""
+    rho_0, wanted = scenario.formation.rho_0, station(scenario)
     radius = trajectory.rho / rho_0
     curves = (
-        (trajectory.alpha1, ABREAST_ALPHA1, LEADER, r"$(\rho/\rho_0,\ \alpha_1)$"),
-        (trajectory.alpha2, ABREAST_ALPHA2, FOLLOWER, r"$(\rho/\rho_0,\ \alpha_2)$"),
+        (trajectory.alpha1, wanted.alpha1, LEADER, r"$(\rho/\rho_0,\ \alpha_1)$"),
+        (trajectory.alpha2, wanted.alpha2, FOLLOWER, r"$(\rho/\rho_0,\ \alpha_2)$"),
     )
     for angle, desired, colour, label in curves:
         axes.plot(np.unwrap(angle), radius, color=colour, lw=1.4, label=label)
@@ -121,16 +125,23 @@ def draw_distance(axes: Axes, trajectory: Trajectory, rho_0: float) -> None:
     axes.set_ylabel(r"$\rho$ [m]")
 
 
-def draw_bearings(axes: Axes, trajectory: Trajectory) -> None:
+def draw_bearings(axes: Axes, scenario: Scenario, trajectory: Trajectory) -> None:
     """Bearings over time, their desired values dashed."""
+    wanted = station(scenario)
     for angle, desired, colour, label in (
-        (trajectory.alpha1, ABREAST_ALPHA1, LEADER, r"$\alpha_1$"),
-        (trajectory.alpha2, ABREAST_ALPHA2, FOLLOWER, r"$\alpha_2$"),
+        (trajectory.alpha1, wanted.alpha1, LEADER, r"$\alpha_1$"),
+        (trajectory.alpha2, wanted.alpha2, FOLLOWER, r"$\alpha_2$"),
     ):
         axes.axhline(desired, color=colour, lw=1.0, ls="--", alpha=0.8)
         axes.plot(trajectory.t, _broken_at_jumps(angle), color=colour, lw=1.4, label=label)
-    low = min(float(trajectory.alpha1.min()), float(trajectory.alpha2.min()), ABREAST_ALPHA1) - 0.3
-    high = max(float(trajectory.alpha1.max()), float(trajectory.alpha2.max()), ABREAST_ALPHA2) + 0.3
+    low = (
+        min(float(trajectory.alpha1.min()), float(trajectory.alpha2.min()), wanted.alpha1, wanted.alpha2)
+        - 0.3
+    )
+    high = (
+        max(float(trajectory.alpha1.max()), float(trajectory.alpha2.max()), wanted.alpha1, wanted.alpha2)
+        + 0.3
+    )
     axes.set_ylim(low, high)
     axes.set_yticks([tick for tick in _PI_TICKS if low <= tick <= high])
     axes.set_yticklabels([text for tick, text in _PI_TICKS.items() if low <= tick <= high])
@@ -139,8 +150,8 @@ def draw_bearings(axes: Axes, trajectory: Trajectory) -> None:
 
 
 def draw_speed(axes: Axes, scenario: Scenario, trajectory: Trajectory) -> None:
-    """Follower's speed over time; dashed v1 + rho_0 u1, the speed that holds the formation exactly."""
-    desired = trajectory.v1 + scenario.formation.rho_0 * trajectory.u1
+    """Follower's speed over time; dashed what holds the station: v1 + rho_0 u1 abreast on the right."""
+    desired = trajectory.v1 + scenario.formation.rho_0 * trajectory.u1 / station(scenario).sin
     _draw_control(axes, trajectory.t, trajectory.v2, desired, scenario.controller.v_max)
     axes.set_ylabel("$v_2$ [m/s]")
 

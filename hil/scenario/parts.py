@@ -15,6 +15,7 @@ from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
 from formation.pose import Motion, Pose
 from formation.shape import Shape, shape_of
 from formation.spacing import Spacing
+from formation.station import Side, Station
 from hil.errors import UsageError
 from hil.scenario.schema import ConstantProgram, ImpulseProgram, Scenario, SinusoidProgram
 
@@ -38,7 +39,12 @@ def gains(scenario: Scenario) -> Gains:
     """Gains of the follower's law, its spacing functions included."""
     given = scenario.controller
     spacing = Spacing(scenario.formation.rho_0, given.mu_rho)
-    return Gains(given.mu1, given.mu2, spacing, tilt=given.tilt)
+    return Gains(given.mu1, given.mu2, spacing, station(scenario), given.tilt)
+
+
+def station(scenario: Scenario) -> Station:
+    """Where the follower is to be, seen from either robot."""
+    return Station(Side(scenario.formation.side), scenario.formation.bearing)
 
 
 def limits(scenario: Scenario) -> Limits:

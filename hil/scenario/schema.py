@@ -6,6 +6,7 @@ an unknown key, a wrong type or a value out of range is a :class:`~hil.errors.Us
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, get_args
 
 from msgspec import UNSET, Meta, Struct, UnsetType
@@ -39,9 +40,14 @@ class RunSection(_Section, frozen=True, kw_only=True):
 
 
 class FormationSection(_Section, frozen=True, kw_only=True):
-    """The desired distance rho_0 [m] between the robots."""
+    """The follower's station: its distance rho_0 [m], the leader's side, and the bearing it keeps it at.
+
+    ``bearing``: angle [rad] between the follower's heading and the line to the leader, pi/2 abreast.
+    """
 
     rho_0: Positive
+    side: Literal["right", "left"] = "right"
+    bearing: Annotated[float, Meta(gt=0.0, lt=math.pi)] = 0.5 * math.pi
 
 
 class ControllerSection(_Section, frozen=True, kw_only=True):

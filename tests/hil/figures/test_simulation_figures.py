@@ -59,10 +59,12 @@ def heights(axes: Axes) -> list[list[float]]:
     return [np.asarray(line.get_ydata(), dtype=float).tolist() for line in axes.lines]
 
 
-def test_a_bearing_that_passes_pi_draws_no_line_across(axes: Axes, trajectory: Trajectory) -> None:
+def test_a_bearing_that_passes_pi_draws_no_line_across(
+    axes: Axes, scenario: Scenario, trajectory: Trajectory
+) -> None:
     turning = wrap(trajectory.t)
     assert float(np.min(np.diff(turning))) < -math.pi
-    draw_bearings(axes, dataclasses.replace(trajectory, alpha1=turning))
+    draw_bearings(axes, scenario, dataclasses.replace(trajectory, alpha1=turning))
     for line in heights(axes):
         steps = np.diff(line)
         assert not np.any(np.abs(steps[np.isfinite(steps)]) > math.pi)
