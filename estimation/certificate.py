@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -85,8 +86,9 @@ class Certificate:
         return {name: getattr(self, name) for name in names}
 
 
+@lru_cache(maxsize=32)
 def certify(given: Premises) -> Certificate:
-    """Certificate of a pair and its leader."""
+    """Certificate of a pair and its leader; takes some tenths of a second, the first time."""
     velocity_error = window_estimator(given.eps, given.acceleration, given.step).bound
     system = Disturbed(given.mu1, given.spacing, given.speeds, given.k_u)
     held = invariant_set(system)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from estimation.bound_check import SpeedInputs, all_bounds, check, errors_of
 from estimation.bounds import InputErrors, RateErrors, Values
 from formation.angles import FloatArray, wrap
 from formation.spacing import Spacing
+from hil.certificate import certificate_of
 from hil.judge.columns import Columns, EstimateColumns
 from hil.scenario.schema import Scenario
 from hil.wire.estimate_message import AssumedErrors
@@ -24,6 +26,12 @@ class WorstErrors:
 
     rates: RateErrors
     inputs: InputErrors
+
+    @staticmethod
+    def of(errors: Mapping[str, Values]) -> WorstErrors:
+        """From errors by name."""
+        inputs = InputErrors(errors["E_rho"], errors["E_alpha2"], errors["E_v2"], errors["E_u2"])
+        return WorstErrors(RateErrors(errors["M_rho"], errors["M_alpha2"]), inputs)
 
 
 def judge_bounds(scenario: Scenario, columns: Columns) -> dict[str, object]:
@@ -80,8 +88,19 @@ def named_bounds(scenario: Scenario, columns: Columns, given: WorstErrors) -> di
 def worst_errors(scenario: Scenario, columns: Columns) -> WorstErrors:
     """Bounds of rate and input errors: of a quantity whose truth is known, the samples' largest error.
 
-    Of any other, the error that the scenario's noise lets assume at each sample's distance.
+    Of any other, what may be assumed: see :func:`assumed_errors`.
     """
+    errors = actual_errors(columns)
+    largest: dict[str, Values] = {
+        name: float(np.nanmax(error)) for name, error in errors.items() if not np.all(np.isnan(error))
+    }
+    if len(largest) < len(errors):
+        largest = assumed_errors(scenario, columns.samples) | largest
+    return WorstErrors.of(largest)
+
+
+def actual_errors(columns: Columns) -> dict[str, FloatArray]:
+    """Magnitudes of the errors that go into the bounds, at each sample; NaN where the truth is not known."""
     seen, true = columns.samples.seen, columns.true
     errors = {
         "M_rho": seen.rho_dot - true.rho_dot,
@@ -91,18 +110,23 @@ def worst_errors(scenario: Scenario, columns: Columns) -> WorstErrors:
         "E_v2": seen.v2 - true.v2,
         "E_u2": seen.u2 - true.u2,
     }
-    largest: dict[str, Values] = {
-        name: float(np.nanmax(np.abs(error))) for name, error in errors.items() if not np.all(np.isnan(error))
-    }
-    if len(largest) < len(errors):
-        largest = _assumed(scenario, columns.samples) | largest
-    return WorstErrors(
-        RateErrors(largest["M_rho"], largest["M_alpha2"]),
-        InputErrors(largest["E_rho"], largest["E_alpha2"], largest["E_v2"], largest["E_u2"]),
-    )
+    return {name: np.abs(error) for name, error in errors.items()}
 
 
-def _assumed(scenario: Scenario, samples: EstimateColumns) -> dict[str, Values]:
+def assumed_errors(scenario: Scenario, samples: EstimateColumns) -> dict[str, Values]:
+    """Bounds of rate and input errors that the scenario alone gives, at each sample's distance.
+
+    Of rates the certificate's error of the leader's velocity, and what is assumed of the follower's own
+    motion; of inputs three standard deviations.
+    """
     assumed = AssumedErrors.of(scenario)
-    at_each = [assumed.errors(max(rho, _NEAREST)) for rho in np.asarray(samples.seen.rho).tolist()]
-    return {name: np.array([getattr(errors, name) for errors in at_each]) for name in _ERRORS}
+    nearest = [max(rho, _NEAREST) for rho in np.asarray(samples.seen.rho).tolist()]
+    at_each = [assumed.errors(rho) for rho in nearest]
+    errors: dict[str, Values] = {
+        name: np.array([getattr(each, name) for each in at_each]) for name in _ERRORS
+    }
+    velocity = certificate_of(scenario, driven=False).velocity_error
+    return errors | {
+        "M_rho": np.full(len(nearest), velocity + assumed.E_v2),
+        "M_alpha2": velocity / np.array(nearest) + assumed.E_u2,
+    }

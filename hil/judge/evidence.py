@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from estimation.clock import Arrival
 from hil.errors import UsageError
-from hil.log.metadata import mode_of, scenario_of
+from hil.log.metadata import IMPORT, mode_of, scenario_of
 from hil.log.reader import Log, Record
 from hil.nodes.node import digest
 from hil.scenario.schema import Scenario
@@ -18,8 +18,6 @@ from hil.wire import topics
 from hil.wire.message_types import Command, DiagnosticArray, LeaderEstimate, Message, RigidBodies, Truth
 from hil.wire.messages import MalformedPayloadError, to_ns
 from hil.wire.topics import Topics, topics_of
-
-IMPORT = "import"
 
 M = TypeVar("M", bound=Message)
 

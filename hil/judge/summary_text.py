@@ -16,6 +16,8 @@ LEAST_COVERAGE = 0.97
 """Of Gaussian errors 99.7 % lie within three standard deviations; below this share they were too small."""
 NIS_RANGE = (1.0, 3.0)
 """Where the mean NIS of a filter is that knows its noise; 2 is the mean for a position in the plane."""
+LEAST_KEPT = 0.9
+"""Assumed errors are three standard deviations of several inputs; below this share they were too small."""
 LOST_SHARE = 0.01
 SATURATED_SHARE = 0.5
 STOPPED_SHARE = 0.02
@@ -36,7 +38,12 @@ def print_summary(summary: Mapping[str, Any], console: Console | None = None) ->
 
 def warnings_of(summary: Mapping[str, Any]) -> list[str]:
     """What deserves a second look, in plain words."""
-    return [*_estimation_warnings(summary), *_formation_warnings(summary), *_wire_warnings(summary)]
+    return [
+        *_estimation_warnings(summary),
+        *_assumption_warnings(summary),
+        *_formation_warnings(summary),
+        *_wire_warnings(summary),
+    ]
 
 
 def _lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
@@ -145,6 +152,17 @@ def _estimation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
         yield f"the measurements are {noisier} than the scenario says (mean NIS {nis:.2g}, expected 2)"
     for name, count in extended_violations(summary).items():
         yield f"bound {name} does not hold in {count} samples: check the noise and leader limits it rests on"
+
+
+def _assumption_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
+    kept = summary["bounds"].get("input_errors_hold", {})
+    if kept.get("all", 1.0) >= LEAST_KEPT:
+        return
+    each = ", ".join(f"{name} {share:.0%}" for name, share in kept.items() if name != "all")
+    yield (
+        f"inputs err as little as the scenario assumes in {kept['all']:.0%} of the samples only ({each}): "
+        "the bounds shown live rest on that"
+    )
 
 
 def _formation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:

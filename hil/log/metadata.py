@@ -5,17 +5,20 @@ from __future__ import annotations
 import tomllib
 
 from hil import __version__
+from hil.certificate import certificate_metadata
 from hil.errors import UsageError
 from hil.log.reader import Log
 from hil.scenario.files import build_scenario, scenario_text
 from hil.scenario.schema import Scenario
 
 RECORD = "abreast"
+IMPORT = "import"
+"""Mode of a log that was made from another recording."""
 
 
 def log_metadata(scenario: Scenario, mode: str) -> dict[str, dict[str, str]]:
-    """Metadata records of a log; ``mode`` is live, lockstep or import."""
-    return {
+    """Metadata records of a log, with the scenario's certificate; ``mode`` is live, lockstep or import."""
+    about = {
         RECORD: {
             "version": __version__,
             "mode": mode,
@@ -24,6 +27,7 @@ def log_metadata(scenario: Scenario, mode: str) -> dict[str, dict[str, str]]:
             "scenario_toml": scenario_text(scenario),
         }
     }
+    return about | certificate_metadata(scenario, driven=mode != IMPORT)
 
 
 def scenario_of(log: Log) -> Scenario | None:

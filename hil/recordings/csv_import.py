@@ -9,8 +9,7 @@ from pathlib import Path
 
 from formation.pose import Motion, Pose
 from hil.emulator.lab_messages import frame_message, odometry_message
-from hil.judge.evidence import IMPORT
-from hil.log.metadata import log_metadata
+from hil.log.metadata import IMPORT, log_metadata
 from hil.log.writer import LogWriter
 from hil.recordings.column_map import ColumnMap
 from hil.recordings.csv_table import Row, read_rows

@@ -12,8 +12,7 @@ from msgspec.structs import replace
 from formation.angles import FloatArray
 from formation.pose import Motion, Pose
 from hil.emulator.lab_messages import frame_message, odometry_message
-from hil.judge.evidence import IMPORT
-from hil.log.metadata import log_metadata
+from hil.log.metadata import IMPORT, log_metadata
 from hil.log.writer import LogWriter
 from hil.recordings.csv_import import Imported
 from hil.recordings.mrclam_folder import Pair, read_pair

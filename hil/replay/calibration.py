@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from estimation.sensor_bias import SensorBias, TooFewSightingsError, find_sensor_bias
 from formation.angles import FloatArray, wrap
 from hil.errors import UsageError
-from hil.judge.evidence import IMPORT
 from hil.log.events import logged_events
-from hil.log.metadata import mode_of
+from hil.log.metadata import IMPORT, mode_of
 from hil.log.reader import Log
 from hil.recordings.smoothed_track import poses_at
 from hil.scenario.schema import Scenario

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from hil.errors import UsageError
-from hil.judge.evidence import IMPORT, Evidence, evidence_of_log
-from hil.log.metadata import mode_of
+from hil.judge.evidence import Evidence, evidence_of_log
+from hil.log.metadata import IMPORT, mode_of
 from hil.log.reader import Log
 from hil.replay.journal import Parity
 from hil.replay.rerun import Replay

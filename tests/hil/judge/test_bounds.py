@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from estimation.bounds import Perceived
+from hil.certificate import certificate_of
 from hil.judge.bounds import judge_bounds, worst_errors
 from hil.judge.columns import columns_of
 from hil.judge.evidence import Evidence
@@ -59,9 +60,10 @@ def test_unknown_errors_are_assumed_and_known_ones_are_not(exact_evidence: Evide
     evidence = replace(exact_evidence, truth=truth)
     found = worst_errors(evidence.scenario, columns_of(evidence))
     assumed = AssumedErrors.of(evidence.scenario).errors(0.2)
+    certain = certificate_of(evidence.scenario).velocity_error
     n = len(columns_of(evidence).samples.capture_ns)
-    assert found.rates.M_rho == pytest.approx(np.full(n, assumed.M_rho))
-    assert found.rates.M_alpha2 == pytest.approx(np.full(n, assumed.M_alpha2))
+    assert found.rates.M_rho == pytest.approx(np.full(n, certain + assumed.E_v2))
+    assert found.rates.M_alpha2 == pytest.approx(np.full(n, certain / 0.2 + assumed.E_u2))
     assert found.inputs.E_v2 == pytest.approx(np.full(n, assumed.E_v2))
     assert found.inputs.E_rho == pytest.approx(0.0, abs=1e-12)
     assert judge_bounds(evidence.scenario, columns_of(evidence))["checked"] == n

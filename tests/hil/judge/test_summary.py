@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from estimation.tracking import Status
+from hil.certificate import recorded_certificate
 from hil.judge.evidence import Evidence, evidence_of_log
 from hil.judge.summary import summarise
 from hil.log.reader import Log
@@ -49,7 +50,11 @@ def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
             *("evaluated_from_s", "samples", "untracked", "settle_s", "nis_mean"),
             *("rmse", "max", "efficiency", "coverage_3sigma"),
         },
-        "bounds": {"M_rho", "M_alpha2", "v_eps", "checked", "violations", "tightness"},
+        "bounds": {
+            *("M_rho", "M_alpha2", "v_eps", "checked", "violations", "tightness"),
+            *("input_errors_hold", "assumed"),
+        },
+        "certificate": parts["certificate"],
         "formation": {
             *("rho_final", "alpha1_final", "alpha2_final", "rho_min", "rho_max"),
             "orbit_deviation_rms",
@@ -149,7 +154,8 @@ def test_frames_add_up(exact_evidence: Evidence) -> None:
 def test_what_nobody_knows_is_absent(exact_evidence: Evidence) -> None:
     summary = summarise(without_truth(exact_evidence))
     assert set(summary) == {
-        *("scenario", "mode", "estimator", "duration_s", "frames", "estimation", "bounds", "log")
+        *("scenario", "mode", "estimator", "duration_s", "frames", "estimation", "bounds", "log"),
+        "certificate",
     }
     assert set(summary["estimation"]) == {
         *("evaluated_from_s", "samples", "untracked", "settle_s", "nis_mean")
@@ -193,3 +199,15 @@ def test_no_estimates_at_all_still_give_a_summary(exact_evidence: Evidence) -> N
 def test_judging_needs_no_pictures() -> None:
     code = "import sys, hil.judge.summary; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_run_carries_its_certificate_as_its_log_does(judged: dict[str, Any], short_log: Log) -> None:
+    assert judged["certificate"] == recorded_certificate(short_log.metadata)
+    found = judged["certificate"]["formation"]
+    assert found["rho_min"] < found["rho_max"]
+
+
+def test_a_recorded_leader_is_certified_by_its_limits_alone(exact_evidence: Evidence) -> None:
+    found = summarise(without_truth(exact_evidence))["certificate"]
+    assert "v1 anywhere between 0.04 and 0.1 m/s" in found["formation"]["assumes"]
+    assert "constant speed" in found["k_u_star"]["why"]

@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hil.judge.assumptions import judge_assumptions
+from hil.judge.columns import columns_of
+from hil.judge.evidence import Evidence
+from hil.log.reader import read_log
+from hil.recordings.column_map import load_column_map
+from hil.recordings.csv_import import import_csv
+from hil.replay.rerun import replay
+from hil.replay.verdict import evidence_of_replay
+from hil.wire.estimate_message import AssumedErrors
+
+EXTENDED = ("v1_extended", "alpha1_extended", "h_extended")
+
+
+def judged(evidence: Evidence) -> dict[str, Any]:
+    return judge_assumptions(evidence.scenario, columns_of(evidence))
+
+
+def test_exact_inputs_keep_to_every_assumption(exact_evidence: Evidence) -> None:
+    found = judged(exact_evidence)
+    assert set(found["input_errors_hold"].values()) == {1.0}
+    assert set(found["input_errors_hold"]) == {"E_rho", "E_alpha2", "E_v2", "E_u2", "all"}
+    assert {found["assumed"]["holds"][name] for name in EXTENDED} == {1.0}
+    counts = found["assumed"]["where_inputs_hold"]["violations"]
+    assert [counts[name] for name in EXTENDED] == [0, 0, 0]
+
+
+def test_samples_whose_inputs_err_too_much_are_set_apart(exact_evidence: Evidence) -> None:
+    """A wild distance breaks the assumption, and so a wild v1 there is no one's fault; elsewhere it is."""
+    assumed = AssumedErrors.of(exact_evidence.scenario).errors(0.2)
+    estimates = list(exact_evidence.estimates)
+    for number in (130, 150):
+        estimates[number] = replace(estimates[number], v1=estimates[number].v1 + 1.0)
+    estimates[130] = replace(estimates[130], rho=estimates[130].rho + 2.0 * assumed.E_rho)
+    evidence = replace(exact_evidence, estimates=estimates)
+    n = len(columns_of(evidence).samples.capture_ns)
+    found = judged(evidence)
+    assert found["input_errors_hold"]["E_rho"] == pytest.approx(1.0 - 1.0 / n)
+    assert found["input_errors_hold"]["E_v2"] == 1.0
+    assert found["assumed"]["holds"]["v1_extended"] == pytest.approx(1.0 - 2.0 / n)
+    there = found["assumed"]["where_inputs_hold"]
+    assert there["samples"] == n - 1
+    assert there["violations"]["v1_extended"] == 1
+
+
+def test_only_inputs_whose_truth_is_known_are_asked(exact_evidence: Evidence) -> None:
+    truth = [replace(each, v2=float("nan"), u2=float("nan")) for each in exact_evidence.truth]
+    found = judged(replace(exact_evidence, truth=truth))
+    assert set(found["input_errors_hold"]) == {"E_rho", "E_alpha2", "all"}
+    assert judged(replace(exact_evidence, truth=[])) == {}
+
+
+@pytest.mark.skipif("ABREAST_REAL" not in os.environ, reason="ABREAST_REAL names no folder of recordings")
+def test_on_a_real_recording_extended_bounds_hold_wherever_their_assumptions_do(tmp_path: Path) -> None:
+    recording = Path(os.environ["ABREAST_REAL"]) / "turtlebot3_lidar_optitrack.csv"
+    path = tmp_path / "real.mcap"
+    import_csv(recording, load_column_map("turtlebot3_lidar_optitrack"), path)
+    log = read_log(path)
+    found = judged(evidence_of_replay(log, replay(log), from_s=2.0))
+    kept = found["input_errors_hold"]
+    assert 0.2 < kept["all"] <= min(kept["E_rho"], kept["E_alpha2"]) < 1.0, "its sensor is biased"
+    there = found["assumed"]["where_inputs_hold"]
+    assert there["samples"] > 40
+    assert [there["violations"][name] for name in EXTENDED] == [0, 0, 0]
+    assert found["assumed"]["holds"]["paper_h"] < 1.0
