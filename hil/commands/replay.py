@@ -130,6 +130,7 @@ def _write(evidence: Evidence, summary: dict[str, Any], table: Path | None, out:
         return
     from hil.figures.run_figures import draw_run
     from hil.figures.shown import Shown
+    from hil.reports.run_report import run_report
 
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -137,4 +138,6 @@ def _write(evidence: Evidence, summary: dict[str, Any], table: Path | None, out:
         raise UsageError(f"--out {out}: cannot be made ({error.strerror}); give another folder") from None
     write_json(summary, out / "summary.json")
     write_estimates(evaluated(evidence), out / "estimates.csv")
-    draw_run(Shown.of(evidence), summary, out / "replay.png")
+    shown = Shown.of(evidence)
+    draw_run(shown, summary, out / "replay.png")
+    (out / "report.html").write_text(run_report(shown, summary), encoding="utf-8")

@@ -133,17 +133,20 @@ def _make_whole(log_path: Path) -> None:
 
 
 def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
-    """Judge the log, and leave summary and picture beside it."""
+    """Judge the log, and leave summary, picture and report beside it."""
     from hil.figures.run_figures import draw_run
     from hil.figures.shown import Shown
     from hil.judge.evidence import evidence_of_log
     from hil.judge.summary import summarise
     from hil.judge.summary_text import print_summary
     from hil.log.reader import read_log
+    from hil.reports.run_report import run_report
 
     evidence = evidence_of_log(read_log(log_path))
     summary = summarise(evidence)
     write_json(summary, folder / "summary.json")
-    draw_run(Shown.of(evidence), summary, folder / "run.png")
+    shown = Shown.of(evidence)
+    draw_run(shown, summary, folder / "run.png")
+    (folder / "report.html").write_text(run_report(shown, summary), encoding="utf-8")
     print_summary(summary)
     return summary

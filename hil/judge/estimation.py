@@ -15,9 +15,9 @@ from estimation.measurement import FrontEnd, PoseNoise
 from estimation.motion import LeaderLimits, ProcessNoise
 from estimation.tracking import Status
 from formation.angles import FloatArray, wrap
-from hil.judge.columns import Columns, inside
+from hil.judge.columns import Columns, EstimateColumns, inside
 from hil.judge.evidence import Evidence, Span
-from hil.judge.true_states import Stamps
+from hil.judge.true_states import Stamps, TrueStates
 from hil.scenario.schema import Scenario
 
 WARM_UP_NS = 3_000_000_000
@@ -57,17 +57,22 @@ def judge_estimation(evidence: Evidence, columns: Columns) -> dict[str, object]:
 
 
 def estimate_errors(columns: Columns) -> dict[str, FloatArray]:
-    """Estimate minus truth of every sample, by quantity, NaN where the truth is not known.
+    """Errors of the judged samples, as :func:`errors_at`."""
+    return errors_at(columns.samples, columns.true)
 
-    Quantities whose truth is known at no sample are left out.
+
+def errors_at(estimates: EstimateColumns, true: TrueStates) -> dict[str, FloatArray]:
+    """Estimate minus truth of every estimate, by quantity, NaN where the truth is not known.
+
+    Quantities whose truth is known nowhere are left out.
     """
-    seen, true = columns.samples.seen, columns.true
+    seen = estimates.seen
     errors = {
         "rho_dot": seen.rho_dot - true.rho_dot,
         "alpha2_dot": seen.alpha2_dot - true.alpha2_dot,
         "v1": seen.v1 - true.v1,
         "alpha1": wrap(seen.alpha1 - true.alpha1),
-        "u1": columns.samples.u1 - true.u1,
+        "u1": estimates.u1 - true.u1,
     }
     return {name: error for name, error in errors.items() if np.any(np.isfinite(error))}
 

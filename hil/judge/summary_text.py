@@ -29,7 +29,7 @@ def print_summary(summary: Mapping[str, Any], console: Console | None = None) ->
     """Print a summary, ``parity`` included, to stderr or another console."""
     console = console or Console(file=sys.stderr)
     table = Table.grid(padding=(0, 2))
-    for name, finding, style in _lines(summary):
+    for name, finding, style in verdict_lines(summary):
         table.add_row(Text(name, style="bold"), Text(finding, style=style))
     console.print(table)
     for warning in warnings_of(summary):
@@ -46,8 +46,8 @@ def warnings_of(summary: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
-    """Name, finding and style of every line."""
+def verdict_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Name, finding and style (``GOOD``, ``BAD`` or ``PLAIN``) of every line of the verdict."""
     made_by = ", ".join(
         [summary["estimator"]] + ([f"{summary['law']} law"] if "law" in summary else []),
     )
@@ -86,9 +86,10 @@ def _estimate_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]
         yield "estimate", f"RMSE {', '.join(parts)} {judged}", PLAIN
     if "violations" in bounds:
         broken = extended_violations(summary)
-        tight = max(value for name, value in bounds["tightness"].items() if name.endswith("_extended"))
+        shares = [value for name, value in bounds["tightness"].items() if name.endswith("_extended")]
+        tight = f" (errors up to {max(shares):.0%})" if shares else ""
         count = f"{sum(broken.values())} times" if broken else "nowhere"
-        verdict = f"extended ones violated {count} in {bounds['checked']} samples (errors up to {tight:.0%})"
+        verdict = f"extended ones violated {count} in {bounds['checked']} samples{tight}"
         yield "bounds", verdict, BAD if broken else GOOD
 
 

@@ -103,6 +103,7 @@ def test_verify_repeats_a_run_and_says_so(abreast: Any, run_log: Path, tmp_path:
     assert json.loads((tmp_path / "out" / "summary.json").read_text()) == found
     assert len(rows(tmp_path / "out" / "estimates.csv")) == found["parity"]["estimates"]["compared"]
     assert (tmp_path / "out" / "replay.png").read_bytes().startswith(b"\x89PNG")
+    assert "<title>turtlebot3 · " in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
 def test_verify_fails_on_a_changed_estimate_and_names_the_first(

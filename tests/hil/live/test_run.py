@@ -133,6 +133,7 @@ def test_a_run_estimates_drives_stops_and_leaves_nothing_behind(start: Callable[
         "run.mcap",
         "scenario.toml",
         "summary.json",
+        "report.html",
         "run.png",
     }
     truth = [decode_as(r.payload, msg.Truth) for r in read_log(run.log).records(topics=[topics.TRUTH])]

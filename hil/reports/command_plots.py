@@ -1,0 +1,92 @@
+"""What the follower was told to do, and when it was told to stand still."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from bokeh.models import ColumnDataSource
+from bokeh.models.glyphs import Quad
+from bokeh.plotting import figure
+
+from formation.angles import FloatArray
+from hil.figures.shown import LONGEST_LINE, Shown
+from hil.judge.columns import inside
+from hil.reports.plots import (
+    FOLLOWER,
+    GREY,
+    LIMIT,
+    Key,
+    Panel,
+    TimeAxis,
+    draw,
+    draw_level,
+    draw_line,
+    hover,
+    limits_around,
+    table,
+)
+from hil.reports.spells import Spell, spells_of
+
+
+def stops_of(shown: Shown) -> list[Spell]:
+    """Spells over which the robot was told to stand still, by reason, while the run lasted."""
+    issued_ns = shown.columns.commands.issued_ns
+    during = inside(issued_ns, shown.columns.run) & (issued_ns < shown.columns.run.to_ns)
+    reasons = [each.stop for each, counts in zip(shown.evidence.commands, during, strict=True) if counts]
+    spells = spells_of(shown.seconds(issued_ns[during]), reasons, LONGEST_LINE)
+    return [spell for spell in spells if spell.what]
+
+
+def command_panels(shown: Shown, axis: TimeAxis) -> list[Panel]:
+    """Commanded speed and turn rate with the limits that are near, and the stops."""
+    commands, controller = shown.columns.commands, shown.evidence.scenario.controller
+    during = inside(commands.issued_ns, shown.columns.run)
+    if not np.any(during):
+        return []
+    t, stops = shown.seconds(commands.issued_ns[during]), stops_of(shown)
+    speed = _panel(axis, "speed", "v₂", "m/s", t, commands.v2[during], controller.v_max, stops)
+    turn = _panel(axis, "turn rate", "u₂", "rad/s", t, commands.u2[during], controller.u_max, stops)
+    return [speed, turn]
+
+
+def _panel(
+    axis: TimeAxis,
+    what: str,
+    symbol: str,
+    unit: str,
+    t: FloatArray,
+    sent: FloatArray,
+    limit: float,
+    stops: Sequence[Spell],
+) -> Panel:
+    low, high = min(float(np.min(sent)), 0.0), float(np.max(sent))
+    # A limit far outside what is driven would only flatten the curve.
+    near = [side for side in (limit, -limit) if 1.6 * low <= side <= 1.6 * high]
+    y = limits_around(sent, np.array([0.0, *near]))
+    plot = axis.panel(f"{symbol} [{unit}]", y)
+    keys = [Key("command", FOLLOWER)]
+    if stops:
+        _shade(plot, stops, y)
+        keys.append(Key("told to stand still", GREY, "band"))
+    for side in near:
+        draw_level(plot, side, LIMIT, "dashed")
+    if near:
+        keys.append(Key(f"limit, {limit:g} {unit}", LIMIT, "dashed"))
+    line = draw_line(plot, table(t, sent, {"y": sent}), "y", FOLLOWER)
+    hover(plot, line, {"t": "@t{0.00} s", "command": f"@y{{0.000}} {unit}"})
+    return Panel(f"Commanded {what} {symbol}", f"The follower's {what} as commanded.", tuple(keys), plot)
+
+
+def _shade(plot: figure, stops: Sequence[Spell], y: tuple[float, float]) -> None:
+    held = {
+        "left": [spell.from_s for spell in stops],
+        "right": [spell.to_s for spell in stops],
+        "why": [spell.what for spell in stops],
+    }
+    area = Quad(
+        left="left", right="right", bottom=y[0], top=y[1],
+        fill_color=GREY, fill_alpha=0.3, line_color=GREY, line_alpha=0.6,
+    )  # fmt: skip
+    tips = {"stands": "@why", "from": "@left{0.00} s", "to": "@right{0.00} s"}
+    hover(plot, draw(plot, ColumnDataSource(held), area), tips, mode="mouse")

@@ -1,0 +1,125 @@
+"""How the estimates came about: their status, their innovations, and the age of what commands rest on."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from bokeh.models import ColumnDataSource
+from bokeh.models.glyphs import HBar
+
+from estimation.tracking import Status
+from formation.angles import FloatArray
+from hil.figures.shown import LONGEST_LINE, Shown
+from hil.judge.columns import inside
+from hil.reports.plots import (
+    BELIEVED,
+    BOUND,
+    FOLLOWER,
+    GREY,
+    PURPLE,
+    Key,
+    Panel,
+    TimeAxis,
+    draw,
+    draw_level,
+    draw_line,
+    draw_marks,
+    hover,
+    marks,
+    table,
+)
+from hil.reports.spells import spells_of
+from hil.reports.thinning import telling_rows
+
+_STATUS_COLOURS = {
+    Status.INITIALISING: GREY,
+    Status.TRACKING: BELIEVED,
+    Status.COASTING: PURPLE,
+    Status.REJECTING: BOUND,
+    Status.LOST: "#222222",
+}
+_EXPECTED_NIS = 2.0
+_ROW_HEIGHT, _AXIS_HEIGHT = 30, 90
+
+
+def status_panel(shown: Shown, axis: TimeAxis) -> Panel | None:
+    """What the estimates said of themselves; None without any."""
+    estimates = shown.columns.estimates
+    during = inside(estimates.capture_ns, shown.columns.run)
+    if not np.any(during):
+        return None
+    statuses = [Status(code) for code in estimates.status[during].tolist()]
+    names = [status.name.lower() for status in statuses]
+    spells = spells_of(shown.seconds(estimates.capture_ns[during]), names, LONGEST_LINE)
+    occurring = [status for status in Status if status in statuses]
+    rows = [status.name.lower() for status in reversed(occurring)]
+    plot = axis.panel("", rows, _AXIS_HEIGHT + _ROW_HEIGHT * len(rows))
+    plot.min_border_left = 78
+    for status in occurring:
+        own = [spell for spell in spells if spell.what == status.name.lower()]
+        held = {
+            "row": [spell.what for spell in own],
+            "from": [spell.from_s for spell in own],
+            "to": [spell.to_s for spell in own],
+            "count": [spell.count for spell in own],
+        }
+        colour = _STATUS_COLOURS[status]
+        bar = HBar(
+            y="row", left="from", right="to", height=0.6, fill_color=colour, line_color=colour, line_width=1.5
+        )
+        bars = draw(plot, ColumnDataSource(held), bar)
+        tips = {"status": "@row", "from": "@from{0.00} s", "to": "@to{0.00} s", "estimates": "@count"}
+        hover(plot, bars, tips, mode="mouse")
+    shares = ", ".join(f"{s.name.lower()} {statuses.count(s) / len(statuses):.1%}" for s in occurring)
+    return Panel("Status", f"What the estimates said of themselves: {shares}.", (), plot)
+
+
+def nis_panel(shown: Shown, axis: TimeAxis) -> Panel | None:
+    """Normalised innovation squared of every estimate against its mean and the gate."""
+    estimates = shown.columns.estimates
+    known = inside(estimates.capture_ns, shown.columns.run) & np.isfinite(estimates.nis)
+    if not np.any(known):
+        return None
+    t, nis = shown.seconds(estimates.capture_ns[known]), estimates.nis[known]
+    gate = -2.0 * math.log1p(-shown.evidence.scenario.estimator.gate_probability)
+    top = 1.25 * gate
+    plot = axis.panel("NIS", (0.0, top))
+    for level, colour, dash in ((_EXPECTED_NIS, GREY, "solid"), (gate, BOUND, "dashed")):
+        draw_level(plot, level, colour, dash)
+    rows = telling_rows(nis)
+    t, nis, over = t[rows], nis[rows], nis[rows] > top
+    dots = draw_marks(plot, marks(t[~over], nis[~over]), "circle", BELIEVED, 3.0)
+    hover(plot, dots, {"t": "@t{0.00} s", "NIS": "@y{0.00}"}, mode="mouse")
+    keys = [
+        Key("NIS", BELIEVED, "dot"),
+        Key("expected mean, 2", GREY),
+        Key(f"gate, {gate:.3g}", BOUND, "dashed"),
+    ]
+    if np.any(over):
+        held = {"t": t[over], "y": np.full(np.count_nonzero(over), 0.96 * top), "nis": nis[over]}
+        beyond = draw_marks(plot, ColumnDataSource(held), "triangle", BOUND, 8.0)
+        hover(plot, beyond, {"t": "@t{0.00} s", "NIS": "@nis{0.0}"}, mode="mouse")
+        keys.append(Key("beyond the picture", BOUND, "triangle"))
+    says = "How far each measurement lay from what was expected, squared and in units of its own variance."
+    return Panel("Innovation", says, tuple(keys), plot)
+
+
+def latency_panel(shown: Shown, axis: TimeAxis) -> Panel | None:
+    """Age of what every command rests on; the first command on a capture gives the latency."""
+    commands = shown.columns.commands
+    based = inside(commands.issued_ns, shown.columns.run) & (commands.capture_ns > 0)
+    if not np.any(based):
+        return None
+    t = shown.seconds(commands.issued_ns[based])
+    age_ms: FloatArray = (commands.issued_ns - commands.capture_ns)[based] * np.float64(1e-6)
+    plot = axis.panel("age [ms]", (0.0, 1.15 * float(np.max(age_ms))))
+    line = draw_line(plot, table(t, age_ms, {"y": age_ms}), "y", FOLLOWER, width=1.0)
+    hover(plot, line, {"t": "@t{0.00} s", "age": "@y{0.0} ms"})
+    keys = [Key("age of the capture behind every command", FOLLOWER)]
+    fresh = commands.fresh[based]
+    if np.any(fresh):
+        rows = telling_rows(age_ms[fresh])
+        draw_marks(plot, marks(t[fresh][rows], age_ms[fresh][rows]), "circle", BELIEVED, 3.0)
+        keys.append(Key("latency: first command on a capture", BELIEVED, "dot"))
+    return Panel("Latency and age", "How old the motion capture behind the commands was.", tuple(keys), plot)

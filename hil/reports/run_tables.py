@@ -1,0 +1,162 @@
+"""The figures of a summary as tables; whatever else a summary holds is listed under its own name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import degrees
+from typing import Any
+
+from hil.reports.page import table_html
+from hil.reports.spells import Spell
+
+_QUANTITIES = {
+    "v1": ("v₁", "mm/s"),
+    "alpha1": ("α₁", "deg"),
+    "rho_dot": ("ρ̇", "mm/s"),
+    "alpha2_dot": ("α̇₂", "deg/s"),
+    "u1": ("u₁", "deg/s"),
+}
+_FORMS = {"extended": "{}_extended", "sound": "{}", "as in the paper": "paper_{}"}
+_BOUNDED = {"v1": "v₁", "alpha1": "α₁", "h": "h"}
+_SCALARS = (
+    ("estimation.evaluated_from_s", "judged from", "s", 1.0),
+    ("estimation.untracked", "did not say tracking", "", 1.0),
+    ("estimation.settle_s", "settled after", "s", 1.0),
+    ("estimation.nis_mean", "mean NIS (2 expected)", "", 1.0),
+    ("bounds.M_rho", "bound of the error of ρ̇, M_rho", "mm/s", 1e3),
+    ("bounds.M_alpha2", "bound of the error of α̇₂, M_alpha2", "deg/s", degrees(1.0)),
+    ("bounds.v_eps", "leader's least speed, v_eps", "mm/s", 1e3),
+    ("formation.rho_min", "ρ, least", "m", 1.0),
+    ("formation.rho_max", "ρ, largest", "m", 1.0),
+    ("formation.rho_final", "ρ at the end", "m", 1.0),
+    ("formation.alpha1_final", "α₁ at the end", "deg", degrees(1.0)),
+    ("formation.alpha2_final", "α₂ at the end", "deg", degrees(1.0)),
+    ("formation.orbit_deviation_rms.rho", "ρ off the noise-free run, RMS", "mm", 1e3),
+    ("formation.orbit_deviation_rms.alpha1", "α₁ off the noise-free run, RMS", "deg", degrees(1.0)),
+    ("latency_ms.capture_to_command.p50", "capture to command, median", "ms", 1.0),
+    ("latency_ms.capture_to_command.p99", "capture to command, 99 %", "ms", 1.0),
+    ("latency_ms.capture_to_command.max", "capture to command, largest", "ms", 1.0),
+)
+_COUNTS = {
+    "estimation": "Estimates",
+    "bounds": "Bounds",
+    "formation": "Formation",
+    "latency_ms": "Latency",
+}
+_MOST_STOPS = 20
+_TOLD = (
+    "scenario",
+    "seed",
+    "mode",
+    "estimator",
+    "law",
+    "duration_s",
+    "log.path",
+    "log.messages",
+    "log.bytes",
+)
+"""What the head of the page says."""
+
+
+def summary_tables(summary: Mapping[str, Any]) -> str:
+    """Tables of all figures of a summary, with units; what the summary lacks is not there."""
+    left = dict(_leaves(summary, ""))
+    for name in _TOLD:
+        left.pop(name, None)
+    tables = [_quality(left), _bounds(left)]
+    for group, caption in _COUNTS.items():
+        rows = [
+            (label, _number(scale * left.pop(path)), unit)
+            for path, label, unit, scale in _SCALARS
+            if path in left and path.startswith(group)
+        ]
+        tables.append(table_html(caption, ("", "value", "unit"), rows))
+    for group, caption in (("frames", "Frames"), ("commands", "Commands"), ("rejected", "Inputs refused")):
+        counts = [
+            (path.partition(".")[2].replace("_", " "), _text(left.pop(path)))
+            for path in list(left)
+            if path.startswith(f"{group}.")
+        ]
+        tables.append(table_html(caption, ("", "count"), counts))
+    rest = [(path, _text(value)) for path, value in left.items()]
+    tables.append(
+        table_html(
+            "Further figures, by their names in summary.json (SI units)", ("", "value"), rest, long=True
+        )
+    )
+    return '<div class="tables">\n' + "\n".join(filter(None, tables)) + "\n</div>"
+
+
+def stops_table(stops: Sequence[Spell]) -> str:
+    """When and why the robot was told to stand still; the longest if there are many."""
+    longest = sorted(stops, key=lambda spell: spell.from_s - spell.to_s)[:_MOST_STOPS]
+    rows = [
+        (spell.what, f"{spell.from_s:.2f}", f"{spell.to_s:.2f}", str(spell.count))
+        for spell in sorted(longest, key=lambda spell: spell.from_s)
+    ]
+    more = f"; the {_MOST_STOPS} longest of {len(stops)}" if len(stops) > _MOST_STOPS else ""
+    return table_html(f"Told to stand still{more}", ("reason", "from [s]", "to [s]", "commands"), rows)
+
+
+def _quality(left: dict[str, Any]) -> str:
+    """Errors of the estimates; a column or a row that nothing is known of is left out."""
+    columns = {
+        "rmse": ("RMSE", _number),
+        "max": ("largest", _number),
+        "efficiency": ("× best possible", _number),
+        "coverage_3sigma": ("within 3 σ", lambda share: f"{share:.2%}"),
+    }
+    held = {
+        name: what for name, what in columns.items() if any(p.startswith(f"estimation.{name}.") for p in left)
+    }
+    rows = []
+    for name, (symbol, unit) in _QUANTITIES.items():
+        cells = []
+        for column, (_, tell) in held.items():
+            value = left.pop(f"estimation.{column}.{name}", None)
+            scale = _scale(unit) if column in ("rmse", "max") else 1.0
+            cells.append("–" if value is None else tell(scale * value))
+        if set(cells) - {"–"}:
+            rows.append((f"{symbol} [{unit}]", *cells))
+    caption = f"Errors of the estimates over {left.pop('estimation.samples', 0)} samples"
+    return table_html(caption, ("", *(label for label, _ in held.values())), rows)
+
+
+def _bounds(left: dict[str, Any]) -> str:
+    """Violations and tightness of every bound."""
+    rows = []
+    for form, pattern in _FORMS.items():
+        for name, symbol in _BOUNDED.items():
+            key = pattern.format(name)
+            broken = left.pop(f"bounds.violations.{key}", None)
+            tightness = left.pop(f"bounds.tightness.{key}", None)
+            if broken is not None:
+                largest = "–" if tightness is None else f"{tightness:.1%}"
+                rows.append((f"{symbol}, {form}", str(broken), largest))
+    caption = f"Bounds of the errors, checked in {left.pop('bounds.checked', 0)} samples"
+    return table_html(caption, ("", "violated in", "largest error / bound"), rows)
+
+
+def _leaves(value: object, path: str) -> Iterator[tuple[str, Any]]:
+    """Every figure with its path, such as ``estimation.rmse.v1``."""
+    if isinstance(value, Mapping):
+        for name, inner in value.items():
+            yield from _leaves(inner, f"{path}.{name}" if path else str(name))
+    else:
+        yield path, value
+
+
+def _scale(unit: str) -> float:
+    return 1e3 if unit.startswith("mm") else degrees(1.0)
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}" if abs(value) < 1000.0 else f"{value:.0f}"
+
+
+def _text(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, (list, tuple)):
+        return ", ".join(map(_text, value))
+    return str(value)

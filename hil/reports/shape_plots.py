@@ -1,0 +1,92 @@
+"""Shape variables over time against their equilibrium and the noise-free run."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from formation.angles import FloatArray
+from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2
+from hil.figures.shown import Shown, broken_at_jumps
+from hil.judge.columns import inside
+from hil.reports.plots import (
+    BELIEVED,
+    GREY,
+    ORBIT,
+    TRUE,
+    Key,
+    Panel,
+    TimeAxis,
+    draw_level,
+    draw_line,
+    hover,
+    limits_around,
+    table,
+)
+
+_SHAPES = (
+    ("rho", "ρ", "m", "Distance ρ", "The distance between the robots."),
+    ("alpha1", "α₁", "rad", "Bearing α₁", "Where the leader sees the follower, from its own heading."),
+    ("alpha2", "α₂", "rad", "Bearing α₂", "Where the follower sees the leader, from its own heading."),
+)
+
+
+def shape_panels(shown: Shown, axis: TimeAxis) -> list[Panel]:
+    """Panels of rho, alpha1 and alpha2: true where that is known, else as estimated."""
+    truth, columns = shown.columns.truth, shown.columns
+    known = inside(truth.capture_ns, columns.run) & np.isfinite(truth.rho)
+    if np.any(known):
+        t = shown.seconds(truth.capture_ns[known])
+        courses = [np.asarray(getattr(truth, name))[known] for name, *_ in _SHAPES]
+        return _panels(shown, axis, t, courses, _noise_free(shown, known), estimated=False)
+    seen = inside(shown.tracked.capture_ns, columns.run)
+    if not np.any(seen):
+        return []
+    t = shown.seconds(shown.tracked.capture_ns[seen])
+    courses = [np.asarray(getattr(shown.tracked.seen, name))[seen] for name, *_ in _SHAPES]
+    return _panels(shown, axis, t, courses, None, estimated=True)
+
+
+def _noise_free(shown: Shown, known: NDArray[np.bool_]) -> list[FloatArray] | None:
+    """The noise-free run at the known truths, NaN before it begins."""
+    if shown.orbit is None:
+        return None
+    moments = shown.columns.truth.capture_ns[known]
+    before = moments < shown.orbit.from_ns
+    return [np.where(before, math.nan, course) for course in shown.orbit.at(moments)]
+
+
+def _panels(
+    shown: Shown,
+    axis: TimeAxis,
+    t: FloatArray,
+    courses: list[FloatArray],
+    ideals: list[FloatArray] | None,
+    *,
+    estimated: bool,
+) -> list[Panel]:
+    colour, label = (BELIEVED, "estimate") if estimated else (TRUE, "truth")
+    driven = shown.evidence.motion_since_ns is not None
+    desired = (shown.evidence.scenario.formation.rho_0, ABREAST_ALPHA1, ABREAST_ALPHA2)
+    panels = []
+    for k, (name, symbol, unit, title, says) in enumerate(_SHAPES):
+        held = {"y": broken_at_jumps(courses[k])}
+        if ideals is not None:
+            held["ideal"] = broken_at_jumps(ideals[k])
+        level = [np.array([desired[k]])] if driven else []
+        floor = 0.0 if name == "rho" else -math.pi
+        plot = axis.panel(f"{symbol} [{unit}]", limits_around(*held.values(), *level, floor=floor))
+        source = table(t, held["y"], held)
+        keys, tips = [Key(label, colour)], {"t": "@t{0.00} s", label: f"@y{{0.0000}} {unit}"}
+        if driven:
+            draw_level(plot, desired[k], GREY, "dotted")
+            keys.append(Key(f"abreast, {desired[k]:.4g} {unit}", GREY, "dotted"))
+        if ideals is not None:
+            draw_line(plot, source, "ideal", ORBIT, dash="dashed")
+            keys.append(Key("noise-free run", ORBIT, "dashed"))
+            tips["noise-free"] = f"@ideal{{0.0000}} {unit}"
+        hover(plot, draw_line(plot, source, "y", colour), tips)
+        panels.append(Panel(title, says, tuple(keys), plot))
+    return panels

@@ -1,0 +1,170 @@
+from __future__ import annotations
+
+import math
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from html import unescape
+from itertools import count
+from pathlib import Path
+
+import msgspec
+import pytest
+from selenium.webdriver import Chrome
+
+from estimation.tracking import Status
+from hil.figures.shown import Shown
+from hil.judge.evidence import Evidence, evidence_of_log
+from hil.judge.summary import summarise
+from hil.log.reader import Log
+from hil.reports.run_report import run_report
+from tests.hil.reports.open_page import open_page
+
+NAN = math.nan
+LARGEST_BYTES = 3_000_000
+MOST_EMPTY = 14
+"""Opaque colours on the canvas of a plot that shows nothing but its frame."""
+
+
+def report(evidence: Evidence) -> str:
+    return run_report(Shown.of(evidence), summarise(evidence))
+
+
+def words(page: str) -> str:
+    """What the page says, without scripts, styles and tags."""
+    bare = re.sub(r"<(script|style)\b.*?</\1>", " ", page, flags=re.DOTALL)
+    return " ".join(unescape(re.sub(r"<[^>]*>", " ", bare)).split())
+
+
+def titles(page: str) -> list[str]:
+    return re.findall(r"<h3>(.*?)</h3>", page)
+
+
+@pytest.fixture(scope="module")
+def written(short_log: Log, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    path.write_text(report(evidence_of_log(short_log)), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("width", [360, 1280])
+def test_a_report_opens_without_a_network_and_fits_the_screen(
+    browser: Chrome, written: Path, width: int
+) -> None:
+    assert written.stat().st_size < LARGEST_BYTES
+    seen = open_page(browser, written, width)
+    assert seen.errors == []
+    assert seen.fetched == []
+    assert seen.width == width
+    assert len(seen.inks) == len(titles(written.read_text(encoding="utf-8"))) == 20
+    assert min(seen.inks) > MOST_EMPTY
+
+
+def no_truth(evidence: Evidence) -> Evidence:
+    return replace(evidence, truth=[], commands=[], motion_since_ns=None, frames=None)
+
+
+def no_estimates(evidence: Evidence) -> Evidence:
+    return replace(evidence, estimates=[])
+
+
+def nothing(evidence: Evidence) -> Evidence:
+    return replace(no_truth(evidence), estimates=[])
+
+
+def positions_only(evidence: Evidence) -> Evidence:
+    poses = [replace(each, v1=NAN, u1=NAN, v2=NAN, u2=NAN) for each in evidence.truth]
+    return replace(evidence, truth=poses, commands=[], motion_since_ns=None, frames=None)
+
+
+@pytest.mark.parametrize(
+    ("lack", "absent", "present"),
+    [
+        (
+            no_truth,
+            ("From above", "Error of", "Commanded", "truth", "noise-free", "RMSE"),
+            ("Distance ρ", "NIS"),
+        ),
+        (positions_only, ("Error of v₁", "Commanded", "noise-free"), ("From above", "Error of α₁")),
+        (no_estimates, ("3 σ", "NIS", "Status"), ("From above", "Commanded speed", "noise-free run")),
+        (nothing, ("From above", "Distance ρ", "Status", "truth"), ("nothing to judge",)),
+    ],
+)
+def test_what_is_not_known_is_left_out(
+    exact_evidence: Evidence,
+    lack: Callable[[Evidence], Evidence],
+    absent: tuple[str, ...],
+    present: tuple[str, ...],
+) -> None:
+    said = words(report(lack(exact_evidence)))
+    assert [each for each in absent if each in said] == []
+    assert [each for each in present if each not in said] == []
+    assert not re.search(r"\b(nan|None|inf)\b", said)
+
+
+def test_the_same_run_gives_the_same_report(written: Path, short_log: Log) -> None:
+    again = report(evidence_of_log(short_log))
+    assert renumbered(again) == renumbered(written.read_text(encoding="utf-8"))
+
+
+def renumbered(page: str) -> str:
+    """With Bokeh's numbers, which count on within a process, in the order of their appearance."""
+    numbers: dict[str, str] = {}
+    fresh = count()
+    return re.sub(r'"p\d+"', lambda found: numbers.setdefault(found[0], f'"p{next(fresh)}"'), page)
+
+
+EVIL = "</title></script><script>alert(1)</script>"
+
+
+@pytest.fixture(scope="module")
+def eventful(exact_evidence: Evidence) -> str:
+    """Report of a run with three samples outside their bounds, stops, estimates lost, and hostile texts."""
+    estimates, commands = list(exact_evidence.estimates), list(exact_evidence.commands)
+    for number in (100, 150, 151):
+        estimates[number] = replace(
+            estimates[number], v1=estimates[number].v1 + 0.01, alpha1=estimates[number].alpha1 + 0.1
+        )
+    for number in range(24):
+        estimates[number] = replace(estimates[number], status=int(Status.LOST))
+    for number in range(60, 90):
+        commands[number] = replace(commands[number], v2=0.0, u2=0.0, stop="stale</script><b>", fresh=False)
+    named = msgspec.structs.replace(exact_evidence.scenario, name=EVIL)
+    evidence = replace(exact_evidence, scenario=named, estimates=estimates, commands=commands)
+    summary = summarise(evidence) | {"certificate": {"h": {"sound": 0.25}, "why": "<none>"}}
+    return run_report(Shown.of(evidence), summary)
+
+
+def test_the_head_says_what_was_run_and_how_it_went(eventful: str) -> None:
+    assert f"{EVIL} · ekf · seed 1 · lockstep" in words(eventful)
+    assert "✗ extended ones violated" in words(eventful)
+    assert 'class="verdict bad"' in eventful
+    assert "inputs refused: gated 1" in words(eventful)
+
+
+def test_violations_are_told_and_marked(eventful: str) -> None:
+    assert words(eventful).count("violated (3)") == 2
+    assert words(eventful).count("Violated in 3 of ") == 2
+    assert eventful.count('"marker":{"type":"value","value":"x"}') == 2
+
+
+def test_stops_and_statuses_are_told(eventful: str) -> None:
+    assert re.search(r"stale\S* 1.03 1.53 30 ", words(eventful))
+    assert re.search(r"tracking 90.0%, lost 10.0%", words(eventful))
+
+
+def test_texts_cannot_smuggle_anything_into_the_page(eventful: str) -> None:
+    assert "<script>alert" not in eventful
+    assert "</script><b>" not in eventful
+
+
+def test_figures_of_other_parts_are_listed_under_their_names(eventful: str) -> None:
+    assert "certificate.h.sound 0.25" in words(eventful)
+    assert "certificate.why <none>" in words(eventful)
+
+
+def test_commands_load_the_plotting_library_only_when_they_write_a_report() -> None:
+    loads = "import sys, hil.command_line, hil.commands.run, hil.commands.replay, hil.commands.daemon"
+    subprocess.run([sys.executable, "-c", f"{loads}; sys.exit('bokeh' in sys.modules)"], check=True)
