@@ -3,7 +3,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -21,89 +20,22 @@ from estimation.bound_check import (
     errors_of,
     h_of,
 )
+from estimation.bound_trials import FIG2, LEVELS, TURTLEBOT3, Setting, judge_trials
 from estimation.bounds import InputErrors, Perceived, RateErrors
-from formation.angles import FloatArray
 from formation.pose import Motion
 from formation.shape import Shape, reduced_rates, relative_rates
-from formation.spacing import Spacing
 
 EXACT_FORMS = {"v1", "alpha1", "h"}
 EXTENDED_FORMS = {"v1_extended", "alpha1_extended", "h_extended"}
-LEVELS = (0.01, 0.05, 0.2, 0.8)
 SAMPLES = 25_000
-
-
-@dataclass(frozen=True)
-class Setting:
-    """Gains of one of the paper's experiments, its leader's speed, and the floor v_eps assumed of it."""
-
-    mu1: float
-    spacing: Spacing
-    v1: float
-    v_eps: float
-
-
-FIG2 = Setting(1.0, Spacing(0.5, 2.0), 0.5, 0.4)
-TURTLEBOT3 = Setting(1.5, Spacing(0.2, 20.0), 0.08, 0.06)
-
-
-class Errors:
-    """Draws errors within given bounds; for half of the samples every error lies on its bound."""
-
-    def __init__(self, generator: np.random.Generator, size: int) -> None:
-        self.generator, self.size = generator, size
-        self.on_edge = generator.random(size) < 0.5
-
-    def bound(self, scale: float) -> FloatArray:
-        """Error bounds spread over three decades up to the scale, so that any of them can dominate."""
-        return scale * 10.0 ** self.generator.uniform(-3.0, 0.0, self.size)
-
-    def within(self, bound: FloatArray) -> FloatArray:
-        part = self.generator.uniform(-1.0, 1.0, self.size)
-        return bound * np.where(self.on_edge, np.sign(part), part)
-
-
-def monte_carlo(setting: Setting, level: float, *, input_errors: bool) -> Verdict:
-    generator = np.random.default_rng([7, round(1000 * level), input_errors])
-    draw, uniform = Errors(generator, SAMPLES), generator.uniform
-    rho_0, v = setting.spacing.rho_0, setting.v1
-    truth = SpeedInputs(
-        rho_0 * uniform(0.5, 4.0, SAMPLES),
-        uniform(setting.v_eps, 2.0 * v - setting.v_eps, SAMPLES),
-        uniform(-math.pi, math.pi, SAMPLES),
-    )
-    alpha2, v2 = uniform(-math.pi, math.pi, SAMPLES), v * uniform(-0.5, 3.0, SAMPLES)
-    u2 = uniform(-2.0, 2.0, SAMPLES)
-    rho_dot = -truth.v1 * np.cos(truth.alpha1) - v2 * np.cos(alpha2)
-    alpha2_dot = -u2 + (truth.v1 * np.sin(truth.alpha1) + v2 * np.sin(alpha2)) / truth.rho
-
-    rates = RateErrors(draw.bound(level * v), draw.bound(level * v / rho_0))
-    scales = (level * rho_0, level, level * v, level) if input_errors else (0.0,) * 4
-    E_rho, E_alpha2, E_v2, E_u2 = (draw.bound(scale) for scale in scales)
-    perceived = Perceived.from_rates(
-        truth.rho + draw.within(E_rho),
-        alpha2 + draw.within(E_alpha2),
-        rho_dot + draw.within(np.asarray(rates.M_rho)),
-        alpha2_dot + draw.within(np.asarray(rates.M_alpha2)),
-        v2 + draw.within(E_v2),
-        u2 + draw.within(E_u2),
-    )
-    bounds = all_bounds(
-        perceived,
-        rates,
-        InputErrors(E_rho, E_alpha2, E_v2, E_u2),
-        v_eps=setting.v_eps,
-        mu1=setting.mu1,
-        spacing=setting.spacing,
-    )
-    return check(errors_of(perceived, truth, setting.mu1, setting.spacing), bounds)
 
 
 def over_all_levels(setting: Setting, *, input_errors: bool) -> Verdict:
     violations: Counter[str] = Counter()
     tightness = dict.fromkeys(QUANTITY_OF, 0.0)
     for level in LEVELS:
-        verdict = monte_carlo(setting, level, input_errors=input_errors)
+        random = np.random.default_rng([7, round(1000 * level), input_errors])
+        verdict = judge_trials(setting, level, random, SAMPLES, input_errors=input_errors)
         violations.update(verdict.violations)
         tightness = {name: max(tightness[name], verdict.tightness[name]) for name in tightness}
     return Verdict(dict(violations), tightness)
