@@ -36,6 +36,14 @@ class Spacing:
         # Factored, so that the zero at rho_0 is exact and its surroundings lose no digits.
         return self.mu_rho * ((rho - self.rho_0) / rho) * ((rho + self.rho_0) / rho)
 
+    def distance(self, pull: float) -> float:
+        """Distance [m] at which f has the value ``pull`` [1/m], below mu_rho: the inverse of f.
+
+        Behind a leader that turns at a constant u1 a pair under law (8) rests at alpha1 = -pi/2 and
+        f(rho) = u1 / v1: with a follower on the right, the further out the harder it turns left.
+        """
+        return self.rho_0 / math.sqrt(1.0 - pull / self.mu_rho)
+
     def g(self, rho: Number) -> Number:
         """Potential g >= 0, without unit: g' = f, zero at rho_0 only, infinite at 0 and at infinity."""
         offset = rho - self.rho_0

@@ -15,16 +15,16 @@ from hil.errors import CheckFailedError, UsageError
 from hil.figures.simulation_figures import draw_experiment, draw_simulation
 from hil.scenario import parts as scenario_parts
 from hil.scenario.schema import Scenario
+from hil.stability import PROVED_V1, stability_json, stability_of, write_stability
 
 SAMPLE_STEP = 0.005
 MOST_SAMPLES = 200_000
-PROVED_V1 = 2.0
 
 _COLUMNS = ("t", "rho", "alpha1", "alpha2", "v1", "u1", "v2", "u2")
 _POSE_COLUMNS = ("x", "y", "theta")
 
 
-def simulate(scenario: Scenario, out: Path | None) -> dict[str, object]:
+def simulate(scenario: Scenario, out: Path | None, *, stability: bool = False) -> dict[str, object]:
     """Run the scenario's law on the exact shape dynamics and report on it; with ``out``, write files there.
 
     The report is the JSON of ``abreast simulate``: ``final`` shape; ``orbit`` of the reduced system, absent
@@ -32,6 +32,8 @@ def simulate(scenario: Scenario, out: Path | None) -> dict[str, object]:
     the whole run; ``V1_initial`` and whether it lies in the region of attraction that Prop. 1 proves (the
     true region is larger). ``orbit.floquet`` is the largest modulus of the Floquet multipliers. The motion is
     not limited, as in the proofs.
+
+    With ``stability``, ``stability`` too: the propositions checked by :mod:`hil.stability`, and its picture.
 
     Files: ``trajectory.csv`` and the pictures ``simulation.png`` (laid out like the paper's Fig. 2) and
     ``experiment.png`` (like its Fig. 3). Raises :class:`CheckFailedError` if the motion breaks down.
@@ -42,9 +44,15 @@ def simulate(scenario: Scenario, out: Path | None) -> dict[str, object]:
         raise CheckFailedError(f"scenario {scenario.name}: {error}; check gains and start poses") from error
     program, law = scenario_parts.leader_program(scenario), scenario_parts.follower_law(scenario)
     orbit = find_orbit(program, law, scenario.formation.rho_0, scenario_parts.station(scenario))
+    report = _report(scenario, trajectory, orbit)
     if out is not None:
         _write(scenario, trajectory, orbit, out)
-    return _report(scenario, trajectory, orbit)
+    if stability:
+        found = stability_of(scenario, trajectory)
+        report["stability"] = stability_json(found)
+        if out is not None:
+            write_stability(scenario, found, out)
+    return report
 
 
 def _sample_times(duration: float) -> FloatArray:

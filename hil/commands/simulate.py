@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 import msgspec
 
+from hil.errors import UsageError
 from hil.report_json import print_json
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
@@ -17,6 +18,7 @@ from hil.scenario.schema import Scenario
 @click.option("--law", help="Law in place of the scenario's.")
 @click.option("--duration", type=click.FloatRange(min=0, min_open=True), help="Seconds to simulate.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for pictures and CSV.")
+@click.option("--stability", is_flag=True, help="Check the propositions of the paper, too; a pair only.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def command(
@@ -24,6 +26,7 @@ def command(
     law: str | None,
     duration: float | None,
     out: Path | None,
+    stability: bool,
     overrides: tuple[str, ...],
     as_json: bool,
 ) -> None:
@@ -36,7 +39,7 @@ def command(
         chosen.append(f"controller.law={law}")
     if duration is not None:
         chosen.append(f"run.duration_s={duration}")
-    result = _simulate(load_scenario(scenario, chosen), out)
+    result = _simulate(load_scenario(scenario, chosen), out, stability=stability)
     if as_json:
         print_json(result)
         return
@@ -46,11 +49,13 @@ def command(
         click.echo(f"pictures and trajectory.csv are in {out}", err=True)
 
 
-def _simulate(scenario: Scenario, out: Path | None) -> dict[str, object]:
+def _simulate(scenario: Scenario, out: Path | None, *, stability: bool) -> dict[str, object]:
     if isinstance(scenario.chain, msgspec.UnsetType):
         from hil.simulation import simulate
 
-        return simulate(scenario, out)
+        return simulate(scenario, out, stability=stability)
+    if stability:
+        raise UsageError(f"--stability is for a pair, and {scenario.name} has a [chain]; leave it out")
     from hil.chain_simulation import simulate_chain_of
 
     return simulate_chain_of(scenario, scenario.chain.agents, out)
