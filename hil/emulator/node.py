@@ -13,8 +13,18 @@ from msgspec import Struct, field
 from msgspec.structs import replace
 
 from formation.pose import STANDSTILL, Motion
+from hil.emulator.faults import Pair, faulty
 from hil.emulator.lab_messages import frame_message, odometry_message, truth_message
-from hil.emulator.mocap import CaptureClock, Delivery, MocapNoise, Stream, draw_frame, normals, observe
+from hil.emulator.mocap import (
+    CaptureClock,
+    Delivery,
+    Draw,
+    MocapNoise,
+    Stream,
+    draw_frame,
+    normals,
+    observe,
+)
 from hil.emulator.robot import Actuators, Robot, drive
 from hil.nodes.node import Counts, Event, Outgoing, counted, diagnostics, named_counts, no_counts, outgoing
 from hil.scenario.parts import leader_program, start_poses
@@ -34,7 +44,7 @@ class EmulatorState(Struct, frozen=True):
     """The world: both robots at ``time_ns``, what is on its way, and what is due next.
 
     ``alive``: daemons that have reported to be well. ``motion_since_ns``: when the leader set off, None
-    before. ``pending``: captured frames by release time.
+    before. ``pending``: captured frames by release time. ``shown``: what the newest of them shows.
     """
 
     time_ns: int
@@ -51,6 +61,7 @@ class EmulatorState(Struct, frozen=True):
     motion_since_ns: int | None = None
     refused: Counts = field(default_factory=no_counts)
     next_diagnostics_ns: int = 0
+    shown: Pair | None = None
 
 
 class EmulatorNode:
@@ -158,22 +169,32 @@ class EmulatorNode:
         out.append(outgoing(topics.TRUTH, truth_message(at_ns, number, leader, follower), at_ns))
         draw = draw_frame(self.scenario.run.seed, number, self.delivery)
         state = replace(state, frames=number + 1)
-        if draw.lost:
+        shown = None if draw.lost else self._shown(state, draw)
+        if shown is None:
             state = replace(state, lost=state.lost + 1)
         else:
-            bodies = (
-                (self.topics.leader, observe(leader.pose, leader.motion, self.noise, draw.leader)),
-                (self.topics.follower, observe(follower.pose, follower.motion, self.noise, draw.follower)),
-            )
+            bodies = ((self.topics.leader, shown.leader), (self.topics.follower, shown.follower))
             stamp_ns = self.clock.stamp_ns(at_ns, state.begun_ns, state.motion_since_ns)
             frame = outgoing(topics.RIGID_BODIES, frame_message(stamp_ns, number, bodies), at_ns)
             pending = list(state.pending)
             insort(pending, (at_ns + round(draw.delay / _NS), number, frame), key=lambda item: item[:2])
-            state = replace(state, pending=tuple(pending))
+            state = replace(state, pending=tuple(pending), shown=shown)
         if at_ns >= state.next_diagnostics_ns:
             out.append(self.report(state, at_ns))
             state = replace(state, next_diagnostics_ns=at_ns + _DIAGNOSTICS_NS)
         return state
+
+    def _shown(self, state: EmulatorState, draw: Draw) -> Pair | None:
+        """Both bodies as the motion capture shows them now, faults included; None for no frame at all."""
+        leader, follower, mocap = state.leader, state.follower, self.scenario.mocap
+        pair = Pair(
+            observe(leader.pose, leader.motion, self.noise, draw.leader),
+            observe(follower.pose, follower.motion, self.noise, draw.follower),
+        )
+        if not mocap.faults or state.motion_since_ns is None:
+            return pair
+        t = (state.time_ns - state.motion_since_ns) * _NS
+        return faulty(mocap.faults, t, 1.0 / mocap.rate_hz, pair, state.shown)
 
     def _lead(self, state: EmulatorState, at_ns: int) -> EmulatorState:
         """Give the leader its next command; it sets off once all are alive."""

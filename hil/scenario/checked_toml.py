@@ -103,7 +103,7 @@ def _explain(error: str, tree: Mapping[str, Any], kind: type[msgspec.Struct]) ->
     path = parts["path"] or ""
     value: Any = tree
     for step in path.split(".") if path else []:
-        value = value.get(step) if isinstance(value, Mapping) else None
+        value = _below(value, step)
     what = parts["what"].replace("`", "").replace("Expected", "expected").replace("Object missing", "missing")
     what = what.replace("expected object, got", "expected a section, got")
     allowed = _allowed(path, tree, kind) if what.startswith("Invalid") else []
@@ -137,11 +137,21 @@ def _walk(
     node: object = tree
     options: list[type[msgspec.Struct]] = [kind]
     for step in path.split(".") if path else []:
-        node = node.get(step) if isinstance(node, Mapping) else None
+        node = _below(node, step)
         fields = [field for option in options for field in msgspec.structs.fields(option)]
-        types = [field.type for field in fields if field.name == step]
+        types = [field.type for field in fields if field.name == step.partition("[")[0]]
         options = [option for given in types for option in (given, *get_args(given)) if _is_section(option)]
     return node, options
+
+
+def _below(node: object, step: str) -> Any:
+    """Value one step down a path as msgspec writes it: ``key``, or ``key[3]`` for an item of a list."""
+    key, *places = step.replace("]", "").split("[")
+    value = node.get(key) if isinstance(node, Mapping) else None
+    for place in places:
+        in_list = isinstance(value, Sequence) and place.isdecimal() and int(place) < len(value)
+        value = value[int(place)] if in_list and isinstance(value, Sequence) else None
+    return value
 
 
 def _is_section(kind: object) -> TypeGuard[type[msgspec.Struct]]:

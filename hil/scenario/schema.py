@@ -143,6 +143,22 @@ class RobotSection(_Section, frozen=True, kw_only=True):
     odometry_sigma_u: NonNegative = 0.01
 
 
+class FaultSection(_Section, frozen=True, kw_only=True):
+    """A fault of the emulated motion capture, ``at_s`` after the leader set off; the truth stays true.
+
+    ``step``: a body shown ``offset`` [m] aside; ``turn``: turned by ``angle`` [rad]; ``swap``: each body
+    under the other's name; ``freeze``: a body's last pose again and again; ``dropout``: no frames.
+    ``duration_s`` 0 stands for one frame.
+    """
+
+    kind: Literal["step", "turn", "swap", "freeze", "dropout"]
+    at_s: NonNegative
+    duration_s: NonNegative = 0.0
+    body: Literal["leader", "follower", "both"] = "leader"
+    offset: tuple[float, float] = (0.02, 0.0)
+    angle: float = math.pi
+
+
 class MocapSection(_Section, frozen=True, kw_only=True):
     """The emulated motion capture: noise of a moving body, the share a standing one has, delivery.
 
@@ -161,6 +177,7 @@ class MocapSection(_Section, frozen=True, kw_only=True):
     clock_drift_ppm: Annotated[float, Meta(ge=-500.0, le=500.0)] = 0.0
     clock_jump_s: float = 0.0
     clock_jump_at_s: NonNegative = 0.0
+    faults: tuple[FaultSection, ...] = ()
 
 
 class EstimatorSection(_Section, frozen=True, kw_only=True):

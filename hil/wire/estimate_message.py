@@ -10,6 +10,7 @@ from estimation.bounds import InputErrors, Perceived, RateErrors
 from estimation.estimate import Estimate
 from estimation.guarantees import guaranteed_rate, leader_acceleration
 from estimation.live_bounds import ErrorBounds, LawConstants, live_bounds
+from estimation.screening import NO_DOUBT
 from estimation.tracking import Status
 from formation.spacing import Spacing
 from hil.scenario.schema import Scenario
@@ -91,6 +92,40 @@ def perceived(estimate: Estimate) -> Perceived:
     )
 
 
+def bounds_of(estimate: Estimate, assumed: AssumedErrors) -> tuple[float, float, float]:
+    """Extended bounds of v1 [m/s], alpha1 [rad] and h [rad/s] of an estimate, its doubt included."""
+    rho = max(estimate.rho, 1e-6)
+    errors = assumed.errors(rho)
+    if estimate.doubt is not NO_DOUBT:
+        errors = _doubted(errors, estimate, rho)
+    return live_bounds(
+        (estimate.rho, estimate.alpha2),
+        (estimate.v1, estimate.alpha1),
+        (estimate.v2, estimate.u2),
+        estimate.alpha2_dot,
+        errors,
+        assumed.law,
+    )
+
+
+def _doubted(errors: ErrorBounds, estimate: Estimate, rho: float) -> ErrorBounds:
+    """Errors that allow for a doubt too.
+
+    It moves the leader by up to ``position`` and turns the line to it by up to position / rho, and the
+    relative velocity, at most v1 + |v2|, is split along and across that line.
+    """
+    turned = estimate.doubt.position / rho
+    rate = (estimate.v1 + abs(estimate.v2)) * (turned + estimate.doubt.heading)
+    return ErrorBounds(
+        M_rho=errors.M_rho + rate,
+        M_alpha2=errors.M_alpha2 + rate / rho,
+        E_rho=errors.E_rho + estimate.doubt.position,
+        E_alpha2=errors.E_alpha2 + turned + estimate.doubt.heading,
+        E_v2=errors.E_v2,
+        E_u2=errors.E_u2,
+    )
+
+
 def to_message(
     estimate: Estimate,
     now_ns: int,
@@ -100,14 +135,7 @@ def to_message(
     receipts: Sequence[Consumed],
 ) -> LeaderEstimate:
     """Message of an estimate made at ``now_ns``, with its extended bounds."""
-    bound_v1, bound_alpha1, bound_h = live_bounds(
-        (estimate.rho, estimate.alpha2),
-        (estimate.v1, estimate.alpha1),
-        (estimate.v2, estimate.u2),
-        estimate.alpha2_dot,
-        assumed.errors(max(estimate.rho, 1e-6)),
-        assumed.law,
-    )
+    bound_v1, bound_alpha1, bound_h = bounds_of(estimate, assumed)
     return LeaderEstimate(
         header=header(estimate.capture_ns, frame_id),
         measured=to_time(estimate.measured_ns),

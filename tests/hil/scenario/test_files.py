@@ -44,7 +44,7 @@ TABLE = "leader.program={kind='table', t=[0.0, 1.0], v=[0.1, 'fast'], u=[0, 0]}"
         ("estimator.kind=kalman", r"estimator\.kind is 'kalman': expected one of 'ekf', 'ukf', "),
         ("leader.program.kind=spiral", r"kind is 'spiral': expected one of 'constant', .*'table'"),
         ("mocap=3", r"mocap is 3: expected a section, got int"),
-        (TABLE, r"leader\.program\.v\[1\]: expected float, got str"),
+        (TABLE, r"leader\.program\.v\[1\] is 'fast': expected float, got str"),
         ("mocap.loss", r"--set 'mocap\.loss': expected section\.key=value"),
         ("=0.1", r"--set '=0\.1': expected section\.key=value"),
         ("mocap..loss=0.1", r"expected section\.key=value"),
