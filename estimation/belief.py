@@ -10,7 +10,7 @@ import numpy as np
 
 from estimation import motion
 from estimation.measurement import FrontEnd, Measurement
-from estimation.memory import Guess, Horizon, ShapeState
+from estimation.memory import Guess, Horizon, SensorOffsets, ShapeState
 from estimation.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise, Vector
 
 
@@ -47,7 +47,7 @@ class Belief(NamedTuple):
     covariance: Matrix
     rates: Rates | None = None
     elapsed: float = 0.0
-    memory: Modes | Guess | ShapeState | Horizon | None = None
+    memory: Modes | Guess | ShapeState | Horizon | SensorOffsets | None = None
 
     @property
     def speed(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from estimation.motion import FollowerMotion, Matrix, Vector
@@ -64,3 +65,54 @@ class Horizon:
     mean: Vector
     covariance: Matrix
     stages: tuple[Stage, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Excitation:
+    """How much a pair has moved against each other of late, as weighted sums over its moments.
+
+    In the frame along the leader's velocity: ``sight`` of the unit vectors to the leader, ``own`` of the
+    follower's velocities [m/s], both as x + iy; ``own_squared`` of their squared lengths; ``doubt`` of the
+    variances [rad^2] with which the leader's direction was known.
+    """
+
+    weight: float = 0.0
+    sight: complex = 0.0
+    own: complex = 0.0
+    own_squared: float = 0.0
+    doubt: float = 0.0
+
+    @property
+    def sd_direction(self) -> float:
+        """Root mean square [rad] of how well the leader's direction was known; infinite without a moment."""
+        return math.sqrt(self.doubt / self.weight) if self.weight > 0.0 else math.inf
+
+    @property
+    def sight_spread(self) -> float:
+        """Standard deviation [rad] of the direction alpha1; to first order."""
+        if self.weight <= 0.0:
+            return 0.0
+        return math.sqrt(max(0.0, 1.0 - abs(self.sight / self.weight) ** 2))
+
+    @property
+    def own_spread(self) -> float:
+        """Standard deviation of the follower's velocity as a share of its root mean square."""
+        if self.own_squared <= 0.0:
+            return 0.0
+        return math.sqrt(max(0.0, 1.0 - abs(self.own) ** 2 / (self.weight * self.own_squared)))
+
+
+@dataclass(frozen=True, slots=True)
+class SensorOffsets:
+    """Offsets (2,) of a sensor's range [m] and bearing [rad], measured minus true.
+
+    covariance: (2, 2). cross: (5, 2), with the leader's states. range_told, bearing_told: whether the pair
+    moves so that they can be told; until then they are left as they are.
+    """
+
+    mean: Vector
+    covariance: Matrix
+    cross: Matrix
+    excitation: Excitation = Excitation()
+    range_told: bool = False
+    bearing_told: bool = False
