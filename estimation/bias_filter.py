@@ -26,10 +26,10 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.belief import Belief, Model
+from estimation.estimator import Estimator
 from estimation.measurement import FrontEnd, Measurement
 from estimation.memory import Excitation, SensorOffsets
 from estimation.motion import STATE_SIZE, FollowerMotion, Matrix, Vector
-from estimation.tracking import Estimator
 
 _MEMORY = 10.0  # seconds over which the pair must have moved against each other
 _CLEAR = 3.0  # how many standard deviations of the leader's direction a change must be worth
@@ -146,8 +146,14 @@ def _aged(excitation: Excitation, share: float) -> Excitation:
 
 
 def _with_moment(excitation: Excitation, belief: Belief, v2: float) -> Excitation:
-    """Add how the line of sight and the follower's velocity lie in the leader's frame, once it is known."""
-    if belief.sd_heading > _SETTLED:
+    """Add how the line of sight and the follower's velocity lie in the leader's frame, once it is known.
+
+    Known but for what the offsets do to it: as constants they cannot feign a change.
+    """
+    offsets = offsets_of(belief)
+    by_offsets = offsets.cross @ np.linalg.solve(offsets.covariance, offsets.cross.T)
+    sd_heading = belief._replace(covariance=belief.covariance - by_offsets).sd_heading
+    if sd_heading > _SETTLED:
         return excitation
     x, y, wx, wy, _ = belief.mean.tolist()
     leader = complex(wx, wy) / math.hypot(wx, wy)
@@ -157,5 +163,5 @@ def _with_moment(excitation: Excitation, belief: Belief, v2: float) -> Excitatio
         excitation.sight + sight,
         excitation.own + v2 * leader.conjugate(),
         excitation.own_squared + v2 * v2,
-        excitation.doubt + belief.sd_heading**2,
+        excitation.doubt + sd_heading**2,
     )

@@ -9,9 +9,8 @@ from dataclasses import replace as with_changes
 from msgspec import Struct, field
 from msgspec.structs import replace
 
-from estimation.belief import Model
 from estimation.estimate import Estimate, estimate_at
-from estimation.estimators import make_estimator, settling
+from estimation.estimators import settling
 from estimation.host_time import HostTime
 from estimation.inputs import History, InputTrust, follower_motion, remember
 from estimation.measurement import (
@@ -22,10 +21,8 @@ from estimation.measurement import (
     measure_body_from_mocap,
     measure_world,
 )
-from estimation.motion import FollowerMotion, LeaderLimits, ProcessNoise
+from estimation.motion import FollowerMotion
 from estimation.own_motion import (
-    ODOMETRY_CORRELATION,
-    TRACK_CORRELATION,
     OwnNoise,
     OwnTrack,
     fold,
@@ -36,6 +33,7 @@ from estimation.tracking import Status, Track, Tracker, TrackSettings, Verdict, 
 from formation.angles import wrap
 from formation.pose import Pose
 from hil.nodes.frame_time import FrameTime
+from hil.nodes.leader_filter import leader_filter, offsets_report
 from hil.nodes.node import (
     Counts,
     Event,
@@ -105,14 +103,10 @@ class EstimatorNode:
 
     def __init__(self, scenario: Scenario) -> None:
         refuse_unrunnable(scenario)
-        given, leader = scenario.estimator, scenario.leader
+        given = scenario.estimator
         self.scenario = scenario
         self.topics = topics_of(scenario)
         self.front_end = FrontEnd(given.front_end)
-        limits = LeaderLimits(leader.v_eps, leader.k_v, leader.k_u)
-        correlation = ODOMETRY_CORRELATION if given.own_motion == "odometry" else TRACK_CORRELATION
-        noise = ProcessNoise.by_rule(limits, given.turn_bandwidth, given.speed_bandwidth)
-        model = Model(self.front_end, limits, noise, input_correlation=correlation)
         settled, unsettled = settling(given.kind)
         settings = TrackSettings(
             gate_probability=given.gate_probability,
@@ -123,7 +117,7 @@ class EstimatorNode:
             settled_heading=settled,
             unsettled_heading=unsettled,
         )
-        self.tracker = Tracker(make_estimator(given.kind, model, given.difference_cutoff_s), settings)
+        self.tracker = Tracker(leader_filter(scenario), settings)
         self.trust = InputTrust(
             given.sigma_v2,
             given.sigma_u2,
@@ -279,6 +273,7 @@ class EstimatorNode:
         status = self.tracker.status(state.track, now_ns)
         values: dict[str, object] = {"status": status.name.lower()}
         values |= self.frame_time.report(state.times)
+        values |= offsets_report(state.track[-1].belief) if state.track else {}
         values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
 

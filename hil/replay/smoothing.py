@@ -10,6 +10,7 @@ from estimation.estimate import estimate_of
 from estimation.measurement import Measurement
 from estimation.smoother import smooth
 from hil.nodes.estimator import REASONS, EstimatorNode, EstimatorState
+from hil.nodes.leader_filter import refuse_bias_states
 from hil.nodes.node import Event, Outgoing
 from hil.scenario.schema import Scenario
 from hil.wire.estimate_message import to_message
@@ -20,6 +21,7 @@ class ListeningEstimator(EstimatorNode):
     """The EKF's node, which keeps the measurements of its whole life, by capture time, beside its state."""
 
     def __init__(self, scenario: Scenario) -> None:
+        refuse_bias_states(scenario)
         super().__init__(replace(scenario, estimator=replace(scenario.estimator, kind="ekf")))
         self.measurements: dict[int, Measurement] = {}
 

@@ -189,6 +189,8 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``own_motion``: where v2 and u2 come from: odometry, the follower's own mocap track, or both fused.
     ``sigma_range``, ``sigma_bearing``: of a body-frame sensor; for mocap they follow from the geometry.
     ``range_bias`` [m], ``bearing_bias`` [rad]: by how much such a sensor's values are above the true ones.
+    ``bias_states``: estimate what is left of these offsets, known beforehand to ``sigma_range_bias`` [m] and
+    ``sigma_bearing_bias`` [rad], wherever the motion of the pair tells them (``ekf`` on the body front end).
     ``turn_bandwidth``: q_u = turn_bandwidth * k_u^2 per second (0.5 agile, 0.03 gentle leaders).
     ``clock``: trusted takes the stamps of mocap frames for host time; estimated maps them to it by what is
     seen of their delays, of which ``transport_latency_s`` is known to be the way.
@@ -208,6 +210,9 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     sigma_bearing: Positive = 0.02
     range_bias: float = 0.0
     bearing_bias: float = 0.0
+    bias_states: bool = False
+    sigma_range_bias: Positive = 0.05
+    sigma_bearing_bias: Positive = 0.1
     sigma_v2: Positive = 0.005
     sigma_u2: Positive = 0.03
     input_delay_s: NonNegative = 0.0

@@ -12,9 +12,11 @@ from estimation.belief import Belief, Model
 from estimation.bias_filter import BiasedExtended, offsets_of
 from estimation.compiled import CompiledExtended
 from estimation.estimate import estimate_of
+from estimation.estimator import Estimator
+from estimation.inputs import mean_motion
 from estimation.measurement import FrontEnd, Measurement, measure_body
 from estimation.motion import FollowerMotion, LeaderLimits, ProcessNoise, Vector
-from estimation.tracking import Estimator, Status, mean_motion
+from estimation.tracking import Status
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
 from formation.shape import shape_of
@@ -77,7 +79,8 @@ def alpha1_error(belief: Belief, seen: Measurement, alpha1: float) -> tuple[floa
 
 
 def test_offsets_are_found_while_the_pair_moves_against_each_other() -> None:
-    plain, biased = [], []
+    plain: list[float] = []
+    biased: list[float] = []
     for seed in range(4):
         seen, alpha1 = sightings(weaving, OFFSETS, 50.0, seed)
         with_offsets = tracked(BiasedExtended(MODEL, *PRIOR), seen)
