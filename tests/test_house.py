@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import tomllib
 import zipfile
 from pathlib import Path
@@ -95,6 +96,14 @@ def test_every_shipped_map_is_one(path: Path) -> None:
         except UsageError:
             continue
     assert len(loaded) == 1
+
+
+def test_every_test_that_the_docs_name_is_there() -> None:
+    text = "".join(path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs").glob("*.md")))
+    named_tests = re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", text)
+    assert named_tests
+    for path, name in named_tests:
+        assert f"def {name}" in (ROOT / path).read_text(encoding="utf-8"), (path, name)
 
 
 def project() -> dict[str, dict[str, str]]:

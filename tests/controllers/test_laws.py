@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -9,7 +10,15 @@ from hypothesis import strategies as st
 from controllers.laws import LAWS, Gains, constant_bearing, ideal, ideal_speed, independent, independent_speed
 from controllers.limits import Limits, clip
 from formation.pose import Motion
-from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2, Shape, reduced_rates, shape_rates
+from formation.shape import (
+    ABREAST_ALPHA1,
+    ABREAST_ALPHA2,
+    Shape,
+    leader_velocity,
+    polar_velocity,
+    reduced_rates,
+    shape_rates,
+)
 from formation.spacing import Spacing, lyapunov
 
 angles = st.floats(-math.pi, math.pi, exclude_min=True)
@@ -94,6 +103,36 @@ def test_first_command_of_the_papers_experiment() -> None:
     u2 = -2.0 * math.cos(0.611459) + (-0.08 * math.sin(0.596867) - v2 * math.sin(0.611459)) / 0.832346
     assert (motion.v, motion.u) == pytest.approx((v2, u2), rel=1e-12)
     assert lyapunov(shape, GAINS.spacing) == pytest.approx(10.05, abs=5e-3)
+
+
+def command_errors(lag: int, measured: bool, steps: int = 60) -> list[float]:
+    """|u2 commanded - u2 wanted| over samples of a shape that is held still, acted on after ``lag`` samples.
+
+    The follower works the leader's motion out of rates and its own turn rate: as measured, or as commanded.
+    """
+    shape, v1, v2 = Shape(0.25, -1.4, 1.5), 0.08, 0.1
+    wanted = constant_bearing(shape, v1, v2, GAINS)
+    commands = [wanted] * lag + [wanted + 0.01]
+    for _ in range(steps):
+        driven = commands[-1 - lag]
+        rates = shape_rates(shape, Motion(v1, 0.0), Motion(v2, driven))
+        used = Motion(v2, driven if measured else commands[-1])
+        seen = polar_velocity(
+            *leader_velocity(shape.rho, shape.alpha2, rates.rho_dot, rates.alpha2_dot, used)
+        )
+        commands.append(constant_bearing(Shape(shape.rho, seen[1], shape.alpha2), seen[0], v2, GAINS))
+    return [abs(command - wanted) for command in commands[lag + 1 :]]
+
+
+@pytest.mark.parametrize("lag", [1, 2, 3, 5])
+def test_a_command_in_the_place_of_the_measured_turn_rate_feeds_back_on_itself(lag: int) -> None:
+    """Its error e obeys e[k] = e[k-1] - e[k-1-lag]: no root of z^(lag+1) - z^lag + 1 lies inside |z| = 1."""
+    assert max(command_errors(lag, measured=True)) < 1e-12
+    errors = command_errors(lag, measured=False)
+    growth = float(np.abs(np.roots([1.0, -1.0, *[0.0] * (lag - 1), 1.0])).max())
+    assert growth >= 1.0 - 1e-12
+    assert max(errors[-2 * lag - 4 :]) >= 0.01 * 0.9
+    assert max(errors[-20:]) > max(errors[:20]) or lag == 1
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf])

@@ -99,3 +99,10 @@ def test_more_gain_never_narrows_the_proof() -> None:
     lowers = [steering_margin(mu1, SPACING, V1).lower for mu1 in (0.75, 1.5, 3.0)]
     assert lowers == sorted(lowers)
     assert steering_margin(30.0, SPACING, V1).upper <= SPACING.mu_rho * V1 * (1.0 + 1e-9)
+
+
+def test_no_gain_holds_a_leader_that_turns_harder_than_mu_rho_v1() -> None:
+    """What mu1 wins for k_u* is capped by the spacing, whose pull ends at mu_rho."""
+    spacing = Spacing(0.2, 20.0)
+    uppers = [steering_margin(mu1, spacing, 0.08).upper for mu1 in (1.5, 3.0, 20.0)]
+    assert uppers[0] < uppers[1] <= uppers[2] <= 1.6 + 1e-3

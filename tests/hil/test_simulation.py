@@ -8,10 +8,12 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from hil.errors import CheckFailedError, UsageError
 from hil.scenario.files import load_scenario
+from hil.scenario.parts import noise_free_run
 from hil.simulation import simulate
 
 DEGREE = math.pi / 180.0
@@ -86,6 +88,13 @@ def test_both_start_outside_the_proved_region(fig2: dict[str, Any], robots: dict
     # One step to the right of the leader, it starts inside.
     near = report_of("fig2-independent", "follower.pose=[0.4, -0.3, 0.7]", "run.duration_s=0.1")
     assert near["in_region_of_attraction"] is True
+
+
+@pytest.mark.parametrize("name", ["fig2-ideal", "fig2-independent"])
+def test_fig2_says_nothing_of_alpha2(name: str) -> None:
+    """Both runs start with alpha2 where it is wanted, and there it stays."""
+    run = noise_free_run(load_scenario(name), np.linspace(0.0, 3.0, 31))
+    np.testing.assert_allclose(run.alpha2, math.pi / 2, atol=1e-12)
 
 
 def test_no_orbit_is_reported_where_there_is_none() -> None:
