@@ -15,11 +15,11 @@ from functools import lru_cache
 import numpy as np
 
 from estimation.bounds import Perceived, RateErrors, paper_h, sound_h
-from estimation.guarantees import alpha2_ultimate, guaranteed_rate, leader_acceleration
-from estimation.window_estimator import window_estimator
+from estimation.guarantees import alpha2_ultimate, guaranteed_rate
+from estimation.premises import Premises
 from formation.angles import FloatArray
-from formation.invariant_set import Disturbed, InvariantSet, SpeedRange, invariant_set
-from formation.spacing import Spacing
+from formation.invariant_set import Disturbed, InvariantSet, invariant_set
+from formation.speed_range import SpeedRange
 from formation.steering_margin import steering_margin
 
 _GRID = 33
@@ -37,33 +37,6 @@ class Claim:
     figures: dict[str, float] = field(default_factory=dict)
     assumes: tuple[str, ...] = ()
     why: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Premises:
-    """What a certificate starts from.
-
-    ``eps``: bound of the error of each measured leader position, in any direction [m]. ``step``: time between
-    two measurements [s]. Of the leader v_eps <= v1 <= k_v [m/s] and |u1| <= k_u [rad/s]; ``speeds``: the
-    speeds that it will really drive, for the formation. Of the law mu1, mu2 [rad/s] and the spacing.
-    ``noise``: in words, where eps comes from.
-    """
-
-    eps: float
-    step: float
-    v_eps: float
-    k_v: float
-    k_u: float
-    speeds: SpeedRange
-    mu1: float
-    mu2: float
-    spacing: Spacing
-    noise: str
-
-    @property
-    def acceleration(self) -> float:
-        """Bound A of the leader's acceleration [m/s^2]."""
-        return float(leader_acceleration(self.k_v, self.k_u))
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +62,7 @@ class Certificate:
 @lru_cache(maxsize=32)
 def certify(given: Premises) -> Certificate:
     """Certificate of a pair and its leader; takes some tenths of a second, the first time."""
-    velocity_error = window_estimator(given.eps, given.acceleration, given.step).bound
+    velocity_error = given.velocity_error
     system = Disturbed(given.mu1, given.spacing, given.speeds, given.k_u)
     held = invariant_set(system)
     rates = _rates(given, velocity_error, held)

@@ -22,26 +22,12 @@ from numpy.typing import NDArray
 from formation.angles import FloatArray, wrap
 from formation.shape import ABREAST_ALPHA1
 from formation.spacing import Spacing
+from formation.speed_range import SpeedRange
 from formation.worst_case_kernels import ESCAPED, LONGEST, half_turn
 
 _HALF_TURNS = 2000
 _CLOSED = 1e-9
 _RIGHT, _LEFT = 1.0, -1.0
-
-
-@dataclass(frozen=True, slots=True)
-class SpeedRange:
-    """Speeds v1 [m/s] that the leader may take, changing as it likes.
-
-    Raises :class:`ValueError` unless 0 < lowest <= highest < infinity.
-    """
-
-    lowest: float
-    highest: float
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.lowest <= self.highest < math.inf:
-            raise ValueError(f"speeds from {self.lowest} to {self.highest}, expected 0 < lowest <= highest")
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,8 +26,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from formation.invariant_set import Disturbed, InvariantSet, SpeedRange, invariant_set
+from formation.invariant_set import Disturbed, InvariantSet, invariant_set
 from formation.spacing import Spacing
+from formation.speed_range import SpeedRange
 
 _RESOLUTION = 1e-4
 

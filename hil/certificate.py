@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
-from estimation.certificate import Certificate, Claim, Premises, certify
-from formation.invariant_set import SpeedRange
+from estimation.premises import Premises
 from formation.spacing import Spacing
-from hil.report_json import as_json
+from formation.speed_range import SpeedRange
 from hil.scenario.schema import Scenario, TableProgram
+
+if TYPE_CHECKING:
+    from estimation.certificate import Certificate, Claim
 
 NOISE_SIGMAS = 5.0
 """Standard deviations that are taken for the bound of a Gaussian error. A position in the plane leaves the
 disc of this radius once in 270,000 frames, more than half an hour at 120 Hz."""
-RECORD = "abreast.certificate"
-_KEY = "certificate_json"
 
 
 def certificate_of(scenario: Scenario, *, driven: bool = True) -> Certificate:
@@ -24,6 +23,8 @@ def certificate_of(scenario: Scenario, *, driven: bool = True) -> Certificate:
 
     Of a recorded leader nothing but its limits is known.
     """
+    from estimation.certificate import certify  # compiled kernels behind it: only for those who ask
+
     return certify(premises_of(scenario, driven=driven))
 
 
@@ -70,17 +71,6 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
 def _claim_json(claim: Claim) -> dict[str, Any]:
     told: dict[str, Any] = {**claim.figures, "assumes": list(claim.assumes)}
     return told if claim.why is None else told | {"why": claim.why}
-
-
-def certificate_metadata(scenario: Scenario, *, driven: bool) -> dict[str, dict[str, str]]:
-    """Metadata record of a log with the scenario's certificate."""
-    return {RECORD: {_KEY: as_json(certificate_json(certificate_of(scenario, driven=driven)))}}
-
-
-def recorded_certificate(metadata: Mapping[str, Mapping[str, str]]) -> dict[str, Any] | None:
-    """Certificate in the metadata of a log, as JSON; None if there is none."""
-    text = metadata.get(RECORD, {}).get(_KEY)
-    return None if text is None else json.loads(text)
 
 
 _TITLES = {

@@ -11,7 +11,7 @@ from estimation.bound_check import SpeedInputs, all_bounds, check, errors_of
 from estimation.bounds import InputErrors, RateErrors, Values
 from formation.angles import FloatArray, wrap
 from formation.spacing import Spacing
-from hil.certificate import certificate_of
+from hil.certificate import premises_of
 from hil.judge.columns import Columns, EstimateColumns
 from hil.scenario.schema import Scenario
 from hil.wire.estimate_message import AssumedErrors
@@ -125,7 +125,7 @@ def assumed_errors(scenario: Scenario, samples: EstimateColumns) -> dict[str, Va
     errors: dict[str, Values] = {
         name: np.array([getattr(each, name) for each in at_each]) for name in _ERRORS
     }
-    velocity = certificate_of(scenario, driven=False).velocity_error
+    velocity = premises_of(scenario, driven=False).velocity_error
     return errors | {
         "M_rho": np.full(len(nearest), velocity + assumed.E_v2),
         "M_alpha2": velocity / np.array(nearest) + assumed.E_u2,

@@ -6,11 +6,11 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from estimation.clock import Arrival
 from hil.errors import UsageError
-from hil.log.metadata import IMPORT, mode_of, scenario_of
+from hil.log.metadata import IMPORT, mode_of, recorded_certificate, scenario_of
 from hil.log.reader import Log, Record
 from hil.nodes.node import digest
 from hil.scenario.schema import Scenario
@@ -56,7 +56,7 @@ class Evidence:
     ``stopped_ns``: when the first stop was ordered, None for none. ``evaluate_from_ns``,
     ``evaluate_to_ns``: limits of the evaluation that take the place of those in the scenario. ``frames`` and
     ``log``: None where they are not known. ``arrivals``: all frames that the estimator could read, as they
-    came.
+    came. ``certificate``: what the log carries for this very scenario, None if it is to be worked out.
 
     A replay is judged on the evidence of its log with its own estimates and counts put in by
     :func:`dataclasses.replace`.
@@ -77,6 +77,7 @@ class Evidence:
     frames: Frames | None = None
     arrivals: Sequence[Arrival] = ()
     log: LogFacts | None = None
+    certificate: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +130,8 @@ def evidence_of_log(log: Log, scenario: Scenario | None = None) -> Evidence:
     and in any other from the first stamp. Raises :class:`UsageError` for a log without a scenario if none is
     given, and as :meth:`Log.records`. Payloads that are not what their topic promises are left out.
     """
-    scenario = scenario or scenario_of(log)
+    own = scenario_of(log)
+    scenario = scenario or own
     if scenario is None:
         raise UsageError(f"log {log.path}: does not tell its scenario; give one, or a map that names one")
     names = topics_of(scenario)
@@ -152,6 +154,7 @@ def evidence_of_log(log: Log, scenario: Scenario | None = None) -> Evidence:
         frames=_frames(scenario, arrivals, truth),
         arrivals=arrivals,
         log=LogFacts(str(log.path), log.messages, log.path.stat().st_size),
+        certificate=recorded_certificate(log) if scenario == own else None,
     )
     return replace(evidence, zero_ns=_zero_ns(log, evidence))
 

@@ -45,7 +45,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "frames": _frames(evidence),
         "estimation": judge_estimation(evidence, columns),
         "bounds": judge_bounds(given, columns) | judge_assumptions(given, columns),
-        "certificate": certificate_json(certificate_of(given, driven=driven)),
+        "certificate": evidence.certificate or certificate_json(certificate_of(given, driven=driven)),
         "formation": judge_formation(evidence, columns),
         "latency_ms": _latency(columns),
         "clock": judge_clock(evidence.arrivals),

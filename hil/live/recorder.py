@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hil.live.certificate_process import CertificateProcess
 from hil.log.metadata import log_metadata
 from hil.log.writer import LogWriter
 from hil.nodes.node import Event, Outgoing, counted, diagnostics, named_counts, no_counts, outgoing
@@ -18,6 +19,7 @@ from hil.wire.topics import topics_of
 NAME = "recorder"
 _FLUSH_NS = 100_000_000
 _DIAGNOSTICS_NS = 500_000_000
+_LAST_CHANCE = 1.0  # s, for a run that ends before its certificate is there
 
 
 class Recorder:
@@ -34,6 +36,7 @@ class Recorder:
         self._counts = no_counts()
         self._next_flush_ns = 0
         self._next_report_ns = 0
+        self._certifying = CertificateProcess(scenario)
 
     def begin(self, now_ns: int) -> None:
         """Start the timers."""
@@ -54,17 +57,21 @@ class Recorder:
         if now_ns < self._next_report_ns:
             return ()
         self._next_report_ns = now_ns + _DIAGNOSTICS_NS
+        self._log.add_metadata(self._certifying.result())
         return (self._report(now_ns),)
 
     def end(self, now_ns: int) -> tuple[Outgoing, ...]:
         """Write the recorder's own last report and finish the file."""
         report = self._report(now_ns)
         self._log.write(report.topic, report.typename, report.payload, now_ns, now_ns)
+        self._log.flush()
+        self._log.add_metadata(self._certifying.result(_LAST_CHANCE))
         self.close()
         return ()
 
     def close(self) -> None:
         """Finish the file; safe to call again."""
+        self._certifying.close()
         self._log.close()
 
     def _write(self, event: Event, now_ns: int) -> None:

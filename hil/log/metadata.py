@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
+from collections.abc import Mapping
+from typing import Any
 
 from hil import __version__
-from hil.certificate import certificate_metadata
 from hil.errors import UsageError
 from hil.log.reader import Log
+from hil.report_json import as_json
 from hil.scenario.files import build_scenario, scenario_text
 from hil.scenario.schema import Scenario
 
 RECORD = "abreast"
+CERTIFICATE = "abreast.certificate"
 IMPORT = "import"
 """Mode of a log that was made from another recording."""
 
 
 def log_metadata(scenario: Scenario, mode: str) -> dict[str, dict[str, str]]:
-    """Metadata records of a log, with the scenario's certificate; ``mode`` is live, lockstep or import."""
-    about = {
+    """Metadata records of a log; ``mode`` is live, lockstep or import."""
+    return {
         RECORD: {
             "version": __version__,
             "mode": mode,
@@ -27,7 +31,6 @@ def log_metadata(scenario: Scenario, mode: str) -> dict[str, dict[str, str]]:
             "scenario_toml": scenario_text(scenario),
         }
     }
-    return about | certificate_metadata(scenario, driven=mode != IMPORT)
 
 
 def scenario_of(log: Log) -> Scenario | None:
@@ -48,3 +51,14 @@ def scenario_of(log: Log) -> Scenario | None:
 def mode_of(log: Log) -> str | None:
     """Mode in which a log was made; None for a log that is not ours."""
     return log.metadata.get(RECORD, {}).get("mode")
+
+
+def certificate_metadata(certificate: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """Metadata record with a certificate, given as JSON of ``abreast bounds``."""
+    return {CERTIFICATE: {"json": as_json(certificate)}}
+
+
+def recorded_certificate(log: Log) -> dict[str, Any] | None:
+    """Certificate that a log carries, as JSON of ``abreast bounds``; None if it has none."""
+    text = log.metadata.get(CERTIFICATE, {}).get("json")
+    return None if text is None else json.loads(text)

@@ -50,8 +50,7 @@ class LogWriter:
             ) from None
         try:
             self._mcap = ChunkedMcap(self._emit, profile="ros2", library=LIBRARY)
-            for name, entries in metadata.items():
-                self._mcap.add_metadata(name, entries)
+            self.add_metadata(metadata)
         except AbreastError:
             self._file.close()
             raise
@@ -71,6 +70,11 @@ class LogWriter:
             or self._mcap.open_chunk_bytes >= _CHUNK_LIMIT_BYTES
         ):
             self.flush()
+
+    def add_metadata(self, metadata: Mapping[str, Mapping[str, str]]) -> None:
+        """Write more metadata records, at once."""
+        for name, entries in metadata.items():
+            self._mcap.add_metadata(name, entries)
 
     def flush(self) -> None:
         """Hand everything written so far to the operating system: it then survives a kill of the process."""

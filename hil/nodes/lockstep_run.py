@@ -6,9 +6,10 @@ import gc
 from pathlib import Path
 from typing import Any
 
+from hil.certificate import certificate_json, certificate_of
 from hil.emulator.node import EmulatorNode, EmulatorState
 from hil.errors import CheckFailedError
-from hil.log.metadata import log_metadata
+from hil.log.metadata import certificate_metadata, log_metadata
 from hil.log.writer import LogWriter
 from hil.nodes.controller import ControllerNode
 from hil.nodes.estimator import EstimatorNode
@@ -36,7 +37,8 @@ def run_lockstep(scenario: Scenario, log_path: Path, nodes: list[Node[Any]] | No
     ``nodes``: those of :func:`make_nodes`, if they have been made before. Raises :class:`CheckFailedError`
     if the leader never sets off.
     """
-    with LogWriter(log_path, log_metadata(scenario, "lockstep")) as log:
+    certificate = certificate_metadata(certificate_json(certificate_of(scenario)))
+    with LogWriter(log_path, log_metadata(scenario, "lockstep") | certificate) as log:
 
         def record(message: Outgoing, now_ns: int) -> None:
             log.write(message.topic, message.typename, message.payload, now_ns, now_ns)

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from formation.pose import Motion, Pose
+from hil.certificate import certificate_json, certificate_of
 from hil.emulator.lab_messages import frame_message, odometry_message
-from hil.log.metadata import IMPORT, log_metadata
+from hil.log.metadata import IMPORT, certificate_metadata, log_metadata
 from hil.log.writer import LogWriter
 from hil.recordings.column_map import ColumnMap
 from hil.recordings.csv_table import Row, read_rows
@@ -37,7 +38,9 @@ def import_csv(recording: Path, chart: ColumnMap, out: Path) -> Imported:
     """
     rows = read_rows(recording, chart)
     names = topics_of(chart.scenario)
-    metadata = log_metadata(chart.scenario, IMPORT)
+    metadata = log_metadata(chart.scenario, IMPORT) | certificate_metadata(
+        certificate_json(certificate_of(chart.scenario, driven=False))
+    )
     metadata["source"] = {"file": recording.name, "map": chart.path.name}
     with LogWriter(out, metadata) as log:
         try:

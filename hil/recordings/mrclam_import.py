@@ -11,8 +11,9 @@ from msgspec.structs import replace
 
 from formation.angles import FloatArray
 from formation.pose import Motion, Pose
+from hil.certificate import certificate_json, certificate_of
 from hil.emulator.lab_messages import frame_message, odometry_message
-from hil.log.metadata import IMPORT, log_metadata
+from hil.log.metadata import IMPORT, certificate_metadata, log_metadata
 from hil.log.writer import LogWriter
 from hil.recordings.csv_import import Imported
 from hil.recordings.mrclam_folder import Pair, read_pair
@@ -44,7 +45,9 @@ def import_mrclam(folder: Path, leader: int, follower: int, out: Path) -> Import
     pair = read_pair(folder, leader, follower)
     frames_ns = pair.follower_track.stamps_ns
     scenario = _scenario(pair)
-    metadata = log_metadata(scenario, IMPORT)
+    metadata = log_metadata(scenario, IMPORT) | certificate_metadata(
+        certificate_json(certificate_of(scenario, driven=False))
+    )
     metadata["source"] = {"folder": folder.name, "leader": pair.leader, "follower": pair.follower}
     streams = (_odometry(pair, topics_of(scenario).odom), _frames(pair), _truth(pair))
     with LogWriter(out, metadata) as log:

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from estimation.bound_check import SpeedInputs, h_of
-from estimation.certificate import Premises, certify
-from formation.invariant_set import Disturbed, SpeedRange, invariant_set
+from estimation.certificate import certify
+from estimation.premises import Premises
+from formation.invariant_set import Disturbed, invariant_set
 from formation.spacing import Spacing
+from formation.speed_range import SpeedRange
 
 TURTLEBOT3 = Premises(
     eps=1.5e-3,

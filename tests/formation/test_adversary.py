@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from formation.adversary import drive_out
-from formation.invariant_set import Disturbed, SpeedRange, invariant_set
+from formation.invariant_set import Disturbed, invariant_set
 from formation.spacing import Spacing
+from formation.speed_range import SpeedRange
 
 TURTLEBOT3 = Disturbed(1.5, Spacing(0.2, 20.0), SpeedRange(0.08, 0.08), 0.7)
 

@@ -9,10 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from formation.closed_loop import integrate
-from formation.invariant_set import Disturbed, InvariantSet, SpeedRange, drawn_in, invariant_set
+from formation.invariant_set import Disturbed, InvariantSet, drawn_in, invariant_set
 from formation.pose import Motion
 from formation.shape import ABREAST_ALPHA1, reduced_rates
 from formation.spacing import Spacing
+from formation.speed_range import SpeedRange
 
 TURTLEBOT3 = Disturbed(1.5, Spacing(0.2, 20.0), SpeedRange(0.08, 0.08), 0.7)
 FIG2 = Disturbed(1.0, Spacing(0.5, 2.0), SpeedRange(0.5, 0.5), 0.7)

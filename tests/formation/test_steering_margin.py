@@ -7,12 +7,13 @@ import pytest
 
 from controllers.laws import Gains, independent
 from formation.closed_loop import integrate
-from formation.invariant_set import Disturbed, SpeedRange, invariant_set
+from formation.invariant_set import Disturbed, invariant_set
 from formation.leader import LeaderProgram, Sinusoid, Table
 from formation.periodic_orbit import find_orbit
 from formation.pose import Motion
 from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2, Shape, reduced_rates
 from formation.spacing import Spacing
+from formation.speed_range import SpeedRange
 from formation.steering_margin import SteeringMargin, steering_margin
 
 MU1, SPACING, V1 = 1.5, Spacing(0.2, 20.0), 0.08

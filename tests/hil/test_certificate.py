@@ -1,11 +1,16 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
-from hil.certificate import certificate_metadata, premises_of, recorded_certificate
+from hil.certificate import certificate_json, certificate_of, premises_of
 from hil.command_line import main
+from hil.log.metadata import certificate_metadata, recorded_certificate
+from hil.log.reader import read_log
+from hil.log.writer import LogWriter
+from hil.report_json import known
 from hil.scenario.files import load_scenario, scenario_names
 
 CONTRACT = {
@@ -46,10 +51,15 @@ def test_people_read_what_is_guaranteed_and_what_is_not(capsys: pytest.CaptureFi
 
 
 @pytest.mark.parametrize("name", scenario_names())
-def test_every_shipped_pair_has_a_certificate_that_travels_in_metadata(name: str) -> None:
-    scenario = load_scenario(name)
-    assert set(CONTRACT) <= set(recorded_certificate(certificate_metadata(scenario, driven=True)) or {})
-    assert recorded_certificate({}) is None
+def test_every_shipped_pair_has_a_certificate_that_travels_in_metadata(name: str, tmp_path: Path) -> None:
+    certificate = certificate_json(certificate_of(load_scenario(name)))
+    assert set(CONTRACT) <= set(certificate)
+    with LogWriter(tmp_path / "with.mcap", certificate_metadata(certificate)) as log:
+        log.flush()
+    with LogWriter(tmp_path / "without.mcap", {}) as log:
+        log.flush()
+    assert recorded_certificate(read_log(tmp_path / "with.mcap")) == known(certificate)
+    assert recorded_certificate(read_log(tmp_path / "without.mcap")) is None
 
 
 def test_premises_come_from_what_the_lab_knows() -> None:

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from estimation.tracking import Status
-from hil.certificate import recorded_certificate
 from hil.judge.evidence import Evidence, evidence_of_log
 from hil.judge.summary import summarise
+from hil.log.metadata import recorded_certificate
 from hil.log.reader import Log
 from hil.report_json import as_json
 from hil.wire.messages import to_ns, to_time
@@ -38,7 +38,9 @@ def judged(short_log: Log) -> dict[str, Any]:
 
 def without_truth(evidence: Evidence) -> Evidence:
     """As another lab's recording: nobody knows the truth, nothing drove the robots."""
-    return replace(evidence, truth=[], commands=[], motion_since_ns=None, frames=None, refused={})
+    return replace(
+        evidence, certificate=None, truth=[], commands=[], motion_since_ns=None, frames=None, refused={}
+    )
 
 
 def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
@@ -202,7 +204,7 @@ def test_judging_needs_no_pictures() -> None:
 
 
 def test_a_run_carries_its_certificate_as_its_log_does(judged: dict[str, Any], short_log: Log) -> None:
-    assert judged["certificate"] == recorded_certificate(short_log.metadata)
+    assert judged["certificate"] == recorded_certificate(short_log)
     found = judged["certificate"]["formation"]
     assert found["rho_min"] < found["rho_max"]
 

@@ -1,0 +1,62 @@
+"""A scenario's certificate from a process of its own, at the lowest priority: the run goes first."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tomllib
+
+from hil.log.metadata import certificate_metadata
+from hil.scenario.files import build_scenario, scenario_text
+from hil.scenario.schema import Scenario
+
+
+class CertificateProcess:
+    """Starts at once. The result can be had once; whoever can't wait for it goes without."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "hil.live.certificate_process"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
+        if self._process.stdin is not None:
+            self._process.stdin.write(scenario_text(scenario).encode())
+            self._process.stdin.close()
+        self._told = False
+
+    def result(self, timeout: float = 0.0) -> dict[str, dict[str, str]]:
+        """Metadata record with the certificate if it is there within ``timeout`` [s], and was not before."""
+        if self._told:
+            return {}
+        try:
+            code = self._process.wait(timeout)  # the answer is short: it fits into the pipe
+        except subprocess.TimeoutExpired:
+            return {}
+        self._told = True
+        answer = self._process.stdout
+        return certificate_metadata(json.loads(answer.read())) if code == 0 and answer else {}
+
+    def close(self) -> None:
+        """End the process; safe to call again."""
+        self._told = True
+        self._process.kill()
+        self._process.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+
+
+def _certify() -> None:
+    os.nice(19)
+    from hil.certificate import certificate_json, certificate_of
+    from hil.report_json import as_json
+
+    scenario = build_scenario(tomllib.loads(sys.stdin.read()), source="scenario of the recorder")
+    sys.stdout.write(as_json(certificate_json(certificate_of(scenario))))
+
+
+if __name__ == "__main__":
+    _certify()
