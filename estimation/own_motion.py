@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import bisect
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,6 +100,20 @@ def fold(
     oldest_ns = points[-1].capture_ns - round(span / _NS)
     first = bisect.bisect_left(points, oldest_ns, key=_capture_ns)
     return tuple(points[max(first - 1, 0) :])
+
+
+def refolded(
+    track: OwnTrack, since_ns: int, odometry_at: Callable[[int], FollowerMotion | None], noise: OwnNoise
+) -> OwnTrack:
+    """Track with the odometry that is now known at its poses from ``since_ns`` on.
+
+    Its first point stays as it is: what that rests on is gone, or nothing.
+    """
+    place = max(1, bisect.bisect_left(track, since_ns, key=_capture_ns))
+    points = list(track[:place])
+    for due in track[place:]:
+        points.append(_follow(points[-1], due.capture_ns, due.pose, odometry_at(due.capture_ns), noise))
+    return tuple(points)
 
 
 def own_motion(track: OwnTrack, capture_ns: int) -> FollowerMotion | None:

@@ -44,7 +44,8 @@ class EmulatorState(Struct, frozen=True):
     """The world: both robots at ``time_ns``, what is on its way, and what is due next.
 
     ``alive``: daemons that have reported to be well. ``motion_since_ns``: when the leader set off, None
-    before. ``pending``: captured frames by release time. ``shown``: what the newest of them shows.
+    before. ``pending``: captured frames, and odometry that is told later, by release time. ``shown``: what
+    the newest frame shows.
     """
 
     time_ns: int
@@ -176,9 +177,8 @@ class EmulatorNode:
             bodies = ((self.topics.leader, shown.leader), (self.topics.follower, shown.follower))
             stamp_ns = self.clock.stamp_ns(at_ns, state.begun_ns, state.motion_since_ns)
             frame = outgoing(topics.RIGID_BODIES, frame_message(stamp_ns, number, bodies), at_ns)
-            pending = list(state.pending)
-            insort(pending, (at_ns + round(draw.delay / _NS), number, frame), key=lambda item: item[:2])
-            state = replace(state, pending=tuple(pending), shown=shown)
+            state = replace(state, shown=shown)
+            state = _with_pending(state, at_ns + round(draw.delay / _NS), number, frame)
         if at_ns >= state.next_diagnostics_ns:
             out.append(self.report(state, at_ns))
             state = replace(state, next_diagnostics_ns=at_ns + _DIAGNOSTICS_NS)
@@ -218,11 +218,15 @@ class EmulatorNode:
             normal = normals(self.scenario.run.seed, stream, number, 2)
             moving = 0.0 if body.motion == STANDSTILL else 1.0
             measured = Motion(
-                body.motion.v + moving * robot.odometry_sigma_v * normal[0],
-                body.motion.u + moving * robot.odometry_sigma_u * normal[1],
+                robot.odometry_scale_v * body.motion.v + moving * robot.odometry_sigma_v * normal[0],
+                robot.odometry_scale_u * body.motion.u + moving * robot.odometry_sigma_u * normal[1],
             )
-            message = odometry_message(at_ns, name, body.pose, measured)
-            out.append(outgoing(f"{name}/odom", message, at_ns))
+            told_ns = at_ns + round(robot.odometry_delay_s / _NS)
+            message = outgoing(f"{name}/odom", odometry_message(told_ns, name, body.pose, measured), told_ns)
+            if told_ns == at_ns:
+                out.append(message)
+            else:
+                state = _with_pending(state, told_ns, number, message)
         leader_drives = drive_message(
             state.leader.command, at_ns, self.topics.leader, stamped=self.topics.stamped
         )
@@ -246,3 +250,9 @@ class EmulatorNode:
             values["motion_since_ns"] = state.motion_since_ns
         values |= named_counts("refused", state.refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
+
+
+def _with_pending(state: EmulatorState, release_ns: int, number: int, message: Outgoing) -> EmulatorState:
+    pending = list(state.pending)
+    insort(pending, (release_ns, number, message), key=lambda item: item[:2])
+    return replace(state, pending=tuple(pending))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import bisect
 import math
 from collections.abc import Callable
+from dataclasses import asdict
 from dataclasses import replace as with_changes
 
 from msgspec import Struct, field
@@ -22,12 +24,22 @@ from estimation.measurement import (
     measure_world,
 )
 from estimation.motion import FollowerMotion
+from estimation.odometry_correction import (
+    IDEAL,
+    NOTHING_SEEN,
+    Watch,
+    reconsidered,
+    with_pose,
+    with_sample,
+)
 from estimation.own_motion import (
     OwnNoise,
     OwnTrack,
     fold,
     own_motion,
+    refolded,
 )
+from estimation.retelling import retold
 from estimation.screening import Cause
 from estimation.tracking import Status, Track, Tracker, TrackSettings, Verdict, cause_at
 from formation.angles import wrap
@@ -57,6 +69,7 @@ NAME = "estimator"
 _TICK_NS = 50_000_000
 _DIAGNOSTICS_NS = 500_000_000
 _SAME_PLACE = 1e-3  # two robots whose centres are this close [m] are one body under two names
+_NS = 1e-9
 _HISTORY = 2.0  # seconds of own motion kept, enough for the latest frame that the ring can take
 
 REASONS = {
@@ -79,15 +92,16 @@ class EstimatorState(Struct, frozen=True):
     """All that the estimator remembers.
 
     ``own``: the follower's own mocap track, empty where odometry alone tells of its motion. ``times``: what
-    is known of the clock that frames are stamped by. ``receipts``:
-    inputs since the last estimate. ``refused``: inputs that were not used, by cause. ``taken``: inputs that
-    were used, by kind. ``last_status``: of the last estimate that went out.
+    is known of the clock that frames are stamped by. ``watch``: how odometry compares with mocap.
+    ``receipts``: inputs since the last estimate. ``refused``: inputs that were not used, by cause. ``taken``:
+    inputs that were used, by kind. ``last_status``: of the last estimate that went out.
     """
 
     track: Track = ()
     history: History = ()
     own: OwnTrack = ()
     times: HostTime = HostTime()
+    watch: Watch = NOTHING_SEEN
     receipts: tuple[Consumed, ...] = ()
     refused: Counts = field(default_factory=no_counts)
     taken: Counts = field(default_factory=no_counts)
@@ -130,6 +144,7 @@ class EstimatorNode:
         self.own_noise = OwnNoise(self.pose_noise, scenario.controller.v_max, scenario.controller.u_max)
         self.assumed = AssumedErrors.of(scenario)
         self.frame_time = FrameTime(scenario)
+        self.aligns = given.align_odometry and given.own_motion != "mocap"
         self._handlers: dict[str, Callable[[EstimatorState, bytes, int], EstimatorState]] = {
             topics.RIGID_BODIES: self._on_frame,
             self.topics.odom: self._on_odometry,
@@ -160,7 +175,7 @@ class EstimatorNode:
             state = handler(state, event.payload, now_ns)
         except RefusedError as refusal:
             return replace(state, refused=counted(state.refused, refusal.cause)), ()
-        if state.track is before:
+        if state.track is before or event.topic == self.topics.odom:
             return state, ()
         return self._publish(state, now_ns)
 
@@ -185,6 +200,9 @@ class EstimatorNode:
         leader, follower = frame.leader, frame.follower
         if math.dist(leader, (follower.x, follower.y)) < _SAME_PLACE:
             raise RefusedError("same_place")
+        if self.aligns:
+            watch = reconsidered(with_pose(state.watch, capture_ns, follower), now_ns)
+            state = replace(state, watch=watch)
         own, motion = self._own_motion(state, capture_ns, follower)
         measure = measure_world if self.front_end is FrontEnd.WORLD else measure_body_from_mocap
         return self._add(state, measure(capture_ns, leader, follower, self.pose_noise, motion), own)
@@ -194,19 +212,28 @@ class EstimatorNode:
     ) -> tuple[OwnTrack, FollowerMotion]:
         """Own track with a pose in it, if one is kept, and the follower's motion at its capture time."""
         source = self.scenario.estimator.own_motion
-        by_odometry = follower_motion(state.history, capture_ns, self.trust)
+        by_odometry = self._by_odometry(state, capture_ns)
         if source == "odometry":
             return (), by_odometry
         fused = by_odometry if source == "fused" and state.history else None
         own = fold(state.own, capture_ns, pose, fused, self.own_noise, self.tracker.settings.window)
         return own, own_motion(own, capture_ns) or by_odometry
 
+    def _by_odometry(self, state: EstimatorState, capture_ns: int) -> FollowerMotion:
+        """Motion of the follower as odometry tells it, put right where that is known to be wrong."""
+        applied = state.watch.applied
+        if applied == IDEAL:
+            return follower_motion(state.history, capture_ns, self.trust)
+        trust = with_changes(self.trust, delay=self.trust.delay + applied.delay)
+        told = follower_motion(state.history, capture_ns, trust)
+        return with_changes(told, v2=applied.scale_v * told.v2, u2=applied.scale_u * told.u2)
+
     def _on_sighting(self, state: EstimatorState, payload: bytes, now_ns: int) -> EstimatorState:
         if self.front_end is FrontEnd.WORLD:
             raise RefusedError("sighting_without_body_front_end")
         sighting = read_sighting(payload, now_ns)
         state = replace(state, taken=counted(state.taken, "frames"))
-        motion = follower_motion(state.history, sighting.capture_ns, self.trust)
+        motion = self._by_odometry(state, sighting.capture_ns)
         given = self.scenario.estimator
         rho, alpha2 = sighting.rho - given.range_bias, float(wrap(sighting.alpha2 - given.bearing_bias))
         if rho <= 0.0:
@@ -219,7 +246,32 @@ class EstimatorNode:
     def _on_odometry(self, state: EstimatorState, payload: bytes, now_ns: int) -> EstimatorState:
         sample = read_odometry(payload, now_ns)
         history = remember(state.history, sample, _HISTORY)
-        return replace(state, history=history, taken=counted(state.taken, "odometry"))
+        state = replace(state, history=history, taken=counted(state.taken, "odometry"))
+        if self.aligns:
+            state = replace(state, watch=with_sample(state.watch, sample))
+        return self._with_late_odometry(state, sample.stamp_ns)
+
+    def _with_late_odometry(self, state: EstimatorState, stamp_ns: int) -> EstimatorState:
+        """Tell again what came after the sample before this one, where that was taken in already."""
+        source = self.scenario.estimator.own_motion
+        place = bisect.bisect_left(state.history, stamp_ns, key=lambda kept: kept.stamp_ns)
+        delay_ns = round((self.trust.delay + state.watch.applied.delay) / _NS)
+        since_ns = state.history[place - 1].stamp_ns + delay_ns + 1 if place else 0
+        newest_ns = state.track[-1].measurement.capture_ns if state.track else 0
+        if source == "mocap" or newest_ns < since_ns:
+            return state
+
+        def by_odometry(capture_ns: int) -> FollowerMotion | None:
+            return self._by_odometry(state, capture_ns)
+
+        if source == "odometry":
+            return replace(state, track=retold(self.tracker, state.track, since_ns, by_odometry))
+        own = refolded(state.own, since_ns, by_odometry, self.own_noise)
+
+        def fused(capture_ns: int) -> FollowerMotion | None:
+            return own_motion(own, capture_ns)
+
+        return replace(state, own=own, track=retold(self.tracker, state.track, since_ns, fused))
 
     def _add(self, state: EstimatorState, measurement: Measurement, own: OwnTrack = ()) -> EstimatorState:
         late = bool(state.track) and measurement.capture_ns < state.track[-1].measurement.capture_ns
@@ -274,6 +326,8 @@ class EstimatorNode:
         values: dict[str, object] = {"status": status.name.lower()}
         values |= self.frame_time.report(state.times)
         values |= offsets_report(state.track[-1].belief) if state.track else {}
+        if self.aligns:
+            values |= {f"odometry.{name}": value for name, value in asdict(state.watch.applied).items()}
         values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
 

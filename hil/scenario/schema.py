@@ -131,7 +131,11 @@ class FollowerSection(_Section, frozen=True, kw_only=True):
 
 
 class RobotSection(_Section, frozen=True, kw_only=True):
-    """The emulated robots: first-order actuator lag, limits, command resolution, wheel odometry noise."""
+    """The emulated robots: first-order actuator lag, limits, command resolution, wheel odometry.
+
+    Odometry is noisy, stamped ``odometry_delay_s`` later than the motion that it tells of, and tells the
+    motion times ``odometry_scale_v`` and ``odometry_scale_u``.
+    """
 
     lag_s: NonNegative = 0.1
     v_max: Positive = 0.22
@@ -141,6 +145,9 @@ class RobotSection(_Section, frozen=True, kw_only=True):
     odometry_rate_hz: Rate = 30.0
     odometry_sigma_v: NonNegative = 0.002
     odometry_sigma_u: NonNegative = 0.01
+    odometry_delay_s: NonNegative = 0.0
+    odometry_scale_v: Positive = 1.0
+    odometry_scale_u: Positive = 1.0
 
 
 class FaultSection(_Section, frozen=True, kw_only=True):
@@ -196,6 +203,7 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     seen of their delays, of which ``transport_latency_s`` is known to be the way.
     ``speed_bandwidth``: q_v = speed_bandwidth * k_v^2 per second (0.01 for leaders that drive evenly, 0.1
     for those that stop and go every few seconds).
+    ``align_odometry``: odometry is corrected by the delay and scales that the follower's mocap track shows.
     ``kind`` smoother is for replays only.
     """
 
@@ -204,6 +212,7 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     own_motion: OwnMotion = "odometry"
     clock: ClockName = "trusted"
     transport_latency_s: NonNegative = 0.0
+    align_odometry: bool = False
     sigma_position: Positive = 0.0003
     sigma_heading: Positive = 0.0035
     sigma_range: Positive = 0.01
