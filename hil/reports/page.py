@@ -38,11 +38,12 @@ _SIGNS = {"dot": "●", "cross": "✕", "triangle": "▲"}
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A part of a page: its heading, ready HTML under it, and plots, which are laid out as a grid."""
+    """A part of a page: its heading, ready HTML under it, and plots in a grid; ``narrow``: three in a row."""
 
     heading: str
     html: str = ""
     panels: Sequence[Panel] = ()
+    narrow: bool = False
 
 
 def page(title: str, head: str, sections: Sequence[Section], script: str = "") -> str:
@@ -83,14 +84,15 @@ def table_html(
         for first, *rest in rows
     )
     top = f"<thead><tr>{head}</tr></thead>" if header else ""
-    broken = ' class="long"' if long else ""
-    title = f"<caption>{escape(caption)}</caption>"
+    broken = ' class="long"' if long else ' class="many"' if len(header) > 5 else ""
+    title = f"<caption>{escape(caption)}</caption>" if caption else ""
     return f'<div class="wide"><table{broken}>{title}{top}\n<tbody>{lines}</tbody></table></div>'
 
 
 def _section(section: Section, place_of: Mapping[int, str]) -> str:
     figures = "\n".join(_figure(panel, place_of[id(panel)]) for panel in section.panels)
-    grid = f'<div class="grid">\n{figures}\n</div>' if figures else ""
+    layout = "grid narrow" if section.narrow else "grid"
+    grid = f'<div class="{layout}">\n{figures}\n</div>' if figures else ""
     return f"<section>\n<h2>{escape(section.heading)}</h2>\n{section.html}\n{grid}\n</section>"
 
 

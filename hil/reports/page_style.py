@@ -20,6 +20,7 @@ dl { display: grid; grid-template-columns: max-content 1fr; gap: .1rem .8rem; ma
 dt { font-weight: 600; } dd { margin: 0; min-width: 0; overflow-wrap: anywhere; }
 .grid { display: grid; gap: 1rem 1.5rem;
   grid-template-columns: repeat(auto-fit, minmax(min(100%, 30rem), 1fr)); }
+.narrow { grid-template-columns: repeat(auto-fit, minmax(min(100%, 20rem), 1fr)); }
 .tall { grid-row: span 2; }
 .tables { display: grid; gap: 1rem 1.5rem; align-items: start;
   grid-template-columns: repeat(auto-fit, minmax(min(100%, 22rem), 1fr)); }
@@ -28,7 +29,9 @@ table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nu
 table { overflow-wrap: normal; } caption { text-align: left; padding-bottom: .2rem; }
 th, td { text-align: right; padding: .15rem .4rem; border-bottom: 1px solid var(--line);
   vertical-align: top; }
+.many tbody th { min-width: 8.5rem; }
 .long td, .long th { overflow-wrap: anywhere; }
+.long th:first-child { width: 34%; } .long td, .long th { text-align: left; }
 th:first-child, td:first-child { text-align: left; padding-left: 0; }
 thead th { font-weight: 600; } tbody th { font-weight: 400; }
 .keys { list-style: none; display: flex; flex-wrap: wrap; gap: 0 .9rem; margin: .1rem 0; padding: 0;
@@ -39,5 +42,6 @@ select { font: inherit; padding: .2rem; max-width: 100%; }
 label { margin-right: 1rem; display: inline-block; }
 a { color: #0059b3; } code { font-size: .9em; overflow-wrap: anywhere; }
 @media (min-width: 48rem) { body { padding: 1.5rem 2rem; } }
+summary { cursor: pointer; padding: .4rem 0; }
 @media print { .grid { grid-template-columns: 1fr 1fr; } figure { break-inside: avoid; } }
 """

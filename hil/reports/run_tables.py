@@ -9,13 +9,14 @@ from typing import Any
 from hil.reports.page import table_html
 from hil.reports.spells import Spell
 
-_QUANTITIES = {
+QUANTITIES = {
     "v1": ("v₁", "mm/s"),
     "alpha1": ("α₁", "deg"),
     "rho_dot": ("ρ̇", "mm/s"),
     "alpha2_dot": ("α̇₂", "deg/s"),
     "u1": ("u₁", "deg/s"),
 }
+"""Symbol and unit in tables of every estimated quantity."""
 _FORMS = {"extended": "{}_extended", "sound": "{}", "as in the paper": "paper_{}"}
 _BOUNDED = {"v1": "v₁", "alpha1": "α₁", "h": "h"}
 _SCALARS = (
@@ -44,6 +45,7 @@ _COUNTS = {
     "latency_ms": "Latency",
 }
 _MOST_STOPS = 20
+_CERTIFICATE, _WORDS = "certificate", ("why", "assumes")
 _TOLD = (
     "scenario",
     "seed",
@@ -78,13 +80,15 @@ def summary_tables(summary: Mapping[str, Any]) -> str:
             if path.startswith(f"{group}.")
         ]
         tables.append(table_html(caption, ("", "count"), counts))
+    guaranteed = _certificate(left)
     rest = [(path, _text(value)) for path, value in left.items()]
-    tables.append(
-        table_html(
-            "Further figures, by their names in summary.json (SI units)", ("", "value"), rest, long=True
-        )
+    further = table_html("By their names in summary.json, in SI units", ("", "value"), rest, long=True)
+    return (
+        '<div class="tables">\n'
+        + "\n".join(filter(None, tables))
+        + f"\n</div>\n{guaranteed}"
+        + (f"<details><summary>Further figures</summary>{further}</details>" if rest else "")
     )
-    return '<div class="tables">\n' + "\n".join(filter(None, tables)) + "\n</div>"
 
 
 def stops_table(stops: Sequence[Spell]) -> str:
@@ -96,6 +100,11 @@ def stops_table(stops: Sequence[Spell]) -> str:
     ]
     more = f"; the {_MOST_STOPS} longest of {len(stops)}" if len(stops) > _MOST_STOPS else ""
     return table_html(f"Told to stand still{more}", ("reason", "from [s]", "to [s]", "commands"), rows)
+
+
+def scale_of(quantity: str) -> float:
+    """What a quantity in SI units is multiplied by to be in the unit of :data:`QUANTITIES`."""
+    return 1e3 if QUANTITIES[quantity][1].startswith("mm") else degrees(1.0)
 
 
 def _quality(left: dict[str, Any]) -> str:
@@ -110,11 +119,11 @@ def _quality(left: dict[str, Any]) -> str:
         name: what for name, what in columns.items() if any(p.startswith(f"estimation.{name}.") for p in left)
     }
     rows = []
-    for name, (symbol, unit) in _QUANTITIES.items():
+    for name, (symbol, unit) in QUANTITIES.items():
         cells = []
         for column, (_, tell) in held.items():
             value = left.pop(f"estimation.{column}.{name}", None)
-            scale = _scale(unit) if column in ("rmse", "max") else 1.0
+            scale = scale_of(name) if column in ("rmse", "max") else 1.0
             cells.append("–" if value is None else tell(scale * value))
         if set(cells) - {"–"}:
             rows.append((f"{symbol} [{unit}]", *cells))
@@ -137,6 +146,24 @@ def _bounds(left: dict[str, Any]) -> str:
     return table_html(caption, ("", "violated in", "largest error / bound"), rows)
 
 
+def _certificate(left: dict[str, Any]) -> str:
+    """What was guaranteed beforehand, or why nothing can be; what it rests on unfolds."""
+    parts: dict[str, dict[str, Any]] = {}
+    for path in [path for path in left if path.startswith(f"{_CERTIFICATE}.")]:
+        _, part, *rest = path.split(".")
+        parts.setdefault(part, {})[".".join(rest)] = left.pop(path)
+    rows, assumptions = [], []
+    for part, figures in parts.items():
+        numbers = [f"{name} {_text(value)}".strip() for name, value in figures.items() if name not in _WORDS]
+        rows.append((part.replace("_", " "), "; ".join(filter(None, [*numbers, figures.get("why")]))))
+        assumptions += [(part.replace("_", " "), _text(figures["assumes"]))] if "assumes" in figures else []
+    certificate = table_html("Guaranteed beforehand, in SI units", ("", "certificate"), rows, long=True)
+    rests_on = table_html("", ("", "assumes"), assumptions, long=True)
+    return certificate + (
+        f"<details><summary>What it rests on</summary>{rests_on}</details>" if rests_on else ""
+    )
+
+
 def _leaves(value: object, path: str) -> Iterator[tuple[str, Any]]:
     """Every figure with its path, such as ``estimation.rmse.v1``."""
     if isinstance(value, Mapping):
@@ -144,10 +171,6 @@ def _leaves(value: object, path: str) -> Iterator[tuple[str, Any]]:
             yield from _leaves(inner, f"{path}.{name}" if path else str(name))
     else:
         yield path, value
-
-
-def _scale(unit: str) -> float:
-    return 1e3 if unit.startswith("mm") else degrees(1.0)
 
 
 def _number(value: float) -> str:
@@ -158,5 +181,5 @@ def _text(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, (list, tuple)):
-        return ", ".join(map(_text, value))
+        return "; ".join(map(_text, value))
     return str(value)

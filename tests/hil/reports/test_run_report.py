@@ -133,7 +133,8 @@ def eventful(exact_evidence: Evidence) -> str:
         commands[number] = replace(commands[number], v2=0.0, u2=0.0, stop="stale</script><b>", fresh=False)
     named = msgspec.structs.replace(exact_evidence.scenario, name=EVIL)
     evidence = replace(exact_evidence, scenario=named, estimates=estimates, commands=commands)
-    summary = summarise(evidence) | {"certificate": {"h": {"sound": 0.25}, "why": "<none>"}}
+    certificate = {"h": {"sound": 0.25, "assumes": ["calm", "order"]}, "k_u_star": {"why": "<too fast>"}}
+    summary = summarise(evidence) | {"certificate": certificate, "weather": {"wind": [0.5, 0.25]}}
     return run_report(Shown.of(evidence), summary)
 
 
@@ -160,9 +161,14 @@ def test_texts_cannot_smuggle_anything_into_the_page(eventful: str) -> None:
     assert "</script><b>" not in eventful
 
 
+def test_the_certificate_tells_what_it_guarantees_or_why_not(eventful: str) -> None:
+    assert "h sound 0.25" in words(eventful)
+    assert "k u star <too fast>" in words(eventful)
+    assert "h calm; order" in words(eventful)
+
+
 def test_figures_of_other_parts_are_listed_under_their_names(eventful: str) -> None:
-    assert "certificate.h.sound 0.25" in words(eventful)
-    assert "certificate.why <none>" in words(eventful)
+    assert "weather.wind 0.5; 0.25" in words(eventful)
 
 
 def test_commands_load_the_plotting_library_only_when_they_write_a_report() -> None:

@@ -1,0 +1,126 @@
+from __future__ import annotations
+
+import math
+import re
+from html import unescape
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import pytest
+from selenium.webdriver import Chrome
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.ui import Select
+
+from hil.reports.sweep_report import sweep_report
+from tests.hil.reports.open_page import open_page
+
+POSITIONS, HEADINGS = (0.0001, 0.001, 0.005), (0.002, 0.035)
+LATENCIES, LOSSES = (0.0, 0.03, 0.2), (0.0, 0.2)
+ESTIMATORS = {"ekf": 1.0, "ukf": 1.05, "difference": 6.0}
+
+
+def cell(estimator: str, position: float, heading: float, latency: float, loss: float) -> dict[str, Any]:
+    """A made-up cell in the form of the contract; the difference estimator breaks sound bounds."""
+    error = ESTIMATORS[estimator] * (position + 0.1 * heading) * (1.0 + latency + loss)
+    quantities = {"rho_dot": 1.0, "alpha2_dot": 8.0, "v1": 1.2, "alpha1": 9.0, "u1": 90.0}
+    names = ("v1", "alpha1", "h", "v1_extended", "alpha1_extended", "h_extended", "paper_alpha1", "paper_h")
+    return {
+        "sigma_position": position,
+        "sigma_heading": heading,
+        "latency_s": latency,
+        "loss": loss,
+        "estimator": estimator,
+        "runs": 100,
+        "samples": 180_000,
+        "diverged": int(estimator == "difference" and loss > 0.1),
+        "rmse": {name: error * factor for name, factor in quantities.items()},
+        "efficiency": dict.fromkeys(quantities, ESTIMATORS[estimator]),
+        "coverage_3sigma": dict.fromkeys(quantities, 0.997),
+        "nis_mean": 2.0,
+        "bounds": {
+            "violations": dict.fromkeys(names, 0) | {"v1": 7 if estimator == "difference" else 0},
+            "tightness": dict.fromkeys(names, 0.5) | {"alpha1_extended": 0.3 + 40.0 * position},
+        },
+        "formation": {"rho_min": 0.19, "rho_max": 0.25, "deviation": {"rho": 0.002}},
+    }
+
+
+@pytest.fixture
+def results() -> dict[str, Any]:
+    grid = product(ESTIMATORS, POSITIONS, HEADINGS, LATENCIES, LOSSES)
+    cells = [cell(*each) for each in grid]
+    return {"cells": cells, "run_seconds": 30.0 * 100 * len(cells), "wall_s": 250.0}
+
+
+def words(page: str) -> str:
+    bare = re.sub(r"<(script|style)\b.*?</\1>", " ", page, flags=re.DOTALL)
+    return " ".join(unescape(re.sub(r"<[^>]*>", " ", bare)).split())
+
+
+_LETTERS = """
+const source = Bokeh.documents[0].roots()[arguments[0]].renderers[1].data_source.data;
+return [Array.from(source.row), Array.from(source.column), Array.from(source.text)];
+"""
+
+
+def letters(browser: Chrome, plot: int) -> dict[tuple[str, str], str]:
+    """What a heat map says now, by position and heading noise."""
+    rows, columns, texts = browser.execute_script(_LETTERS, plot)
+    return dict(zip(zip(rows, columns, strict=True), texts, strict=True))
+
+
+@pytest.mark.parametrize("width", [360, 1280])
+def test_a_sweep_opens_without_a_network_and_shows_what_is_chosen(
+    browser: Chrome, results: dict[str, Any], tmp_path: Path, width: int
+) -> None:
+    path = tmp_path / "report.html"
+    path.write_text(sweep_report(results), encoding="utf-8")
+    seen = open_page(browser, path, width)
+    assert (seen.errors, seen.fetched, seen.width) == ([], [], width)
+    assert len(seen.inks) == 3 * len(ESTIMATORS)
+    assert min(seen.inks) > 5  # the colours of the cells
+    at = (f"{1e3 * POSITIONS[1]:g}", f"{math.degrees(HEADINGS[1]):.3g}")
+    first = cell("ukf", POSITIONS[1], HEADINGS[1], LATENCIES[0], LOSSES[0])
+    assert letters(browser, 1)[at] == f"{1e3 * first['rmse']['v1']:.3g}"
+    Select(browser.find_element(By.ID, "quantity")).select_by_value("alpha1")
+    Select(browser.find_element(By.ID, "slice")).select_by_visible_text("200 ms, 20 % lost")
+    other = cell("ukf", POSITIONS[1], HEADINGS[1], LATENCIES[2], LOSSES[1])
+    assert letters(browser, 1)[at] == f"{math.degrees(other['rmse']['alpha1']):.3g}"
+    assert letters(browser, 3)[at] == "1.00"
+    assert letters(browser, 8)[at] == "34%"
+
+
+def test_the_head_counts_violations_and_divergences(results: dict[str, Any]) -> None:
+    said = words(sweep_report(results))
+    assert "Bounds violated: extended ones 0, sound ones 252 times. 18 runs diverged." in said
+    assert "108 cells, 10800 runs, 19440000 samples" in said
+    assert "3.8 days of driving" in said
+    good = results | {"cells": [each for each in results["cells"] if each["estimator"] == "ekf"]}
+    assert "No sound or extended bound violated in 6480000 samples." in words(sweep_report(good))
+
+
+def test_the_worst_runs_are_linked_where_they_were_kept(results: dict[str, Any]) -> None:
+    cells = results["cells"]
+    hardest = max(range(len(cells)), key=lambda n: (cells[n]["diverged"], n))
+    cells[hardest]["bounds"]["tightness"]["h_extended"] = 0.99
+    cells[hardest]["worst_run"] = 17
+    assert f"--keep {hardest}:17" in words(sweep_report(results))
+    cells[hardest]["kept"] = {"17": 'kept/cell "1" 17'}
+    page = sweep_report(results)
+    assert 'href="./kept/cell%20%221%22%2017/report.html"' in page
+    assert 'href="./kept/cell%20%221%22%2017/run.mcap"' in page
+
+
+def test_what_cells_do_not_know_is_left_out(results: dict[str, Any]) -> None:
+    for each in results["cells"]:
+        del each["efficiency"], each["formation"], each["nis_mean"]
+        each["rmse"] = {} if each["estimator"] == "difference" else each["rmse"]
+        each["bounds"] = {}
+    said = words(sweep_report(results))
+    assert not re.search(r"\b(nan|None|inf)\b", said)
+    assert "difference 3600 18 – – – 0 0 0" in said
+
+
+def test_an_empty_sweep_is_a_page_too() -> None:
+    assert "0 cells" in words(sweep_report({"cells": [], "run_seconds": 0.0, "wall_s": 0.1}))
