@@ -82,6 +82,7 @@ def blank(*, height: int, x_label: str, y_label: str, tools: str, x_range: Range
     plot = figure(
         title=None,
         height=height,
+        min_width=240,  # a first layout without any width would leave traces of its labels
         sizing_mode="stretch_width",
         tools=tools,
         active_drag=None,
