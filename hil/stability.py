@@ -12,9 +12,10 @@ from controllers.attraction import SettlingMap, settling_map
 from controllers.limits import Limits
 from formation.angles import FloatArray
 from formation.closed_loop import Trajectory
-from formation.invariant_set import Disturbed, SpeedRange, invariant_set
+from formation.invariant_set import Disturbed, invariant_set
 from formation.shape import ABREAST_ALPHA2
 from formation.spacing import Spacing, lyapunov
+from formation.speed_range import SpeedRange
 from formation.steering_margin import SteeringMargin, steering_margin
 from hil.errors import UsageError
 from hil.scenario import parts as scenario_parts

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Folder for results."
 )
 @click.option("--strict", is_flag=True, help="Fail if an error lies outside its extended bound.")
+@click.option("--certify", is_flag=True, help="Judge the guaranteed error radius of every estimate too.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object on stdout.")
 def command(
     log: Path,
@@ -46,6 +47,7 @@ def command(
     table: Path | None,
     out: Path | None,
     strict: bool,
+    certify: bool,
     as_json: bool,
 ) -> None:
     """Run LOG through the very steps that run live, and judge what comes out.
@@ -67,6 +69,10 @@ def command(
     summary = summarise(evidence)
     if chart is None and (own_motion := judge_own_motion(given, played.scenario)):
         summary["own_motion"] = own_motion
+    if certify:
+        from hil.judge.certified import judge_certified
+
+        summary["certified"] = judge_certified(given, evidence)
     if verify:
         summary["parity"] = parity_json(played)
     _write(evidence, summary, table, out)

@@ -33,6 +33,7 @@ DURATION = click.FloatRange(min=0, min_open=True)
 @click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override any key of the scenario."
 )
+@click.option("--certify", is_flag=True, help="Judge the guaranteed error radius of every estimate too.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object on stdout.")
 def command(
     scenario: str,
@@ -44,6 +45,7 @@ def command(
     lockstep: bool,
     listen: str | None,
     overrides: tuple[str, ...],
+    certify: bool,
     as_json: bool,
 ) -> None:
     """Drive SCENARIO (a shipped name or a TOML file) through the whole chain, log it and judge it."""
@@ -60,7 +62,7 @@ def command(
         raise CheckFailedError(failure or "interrupted before anything was recorded")
     if failure:
         _make_whole(log_path)
-    summary = _judge(log_path, folder)
+    summary = _judge(log_path, folder, certify=certify)
     if as_json:
         print_json(summary)
     if failure:
@@ -132,7 +134,7 @@ def _make_whole(log_path: Path) -> None:
         )
 
 
-def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
+def _judge(log_path: Path, folder: Path, *, certify: bool) -> dict[str, Any]:
     """Judge the log, and leave summary, picture and report beside it."""
     from hil.figures.run_figures import draw_run
     from hil.figures.shown import Shown
@@ -142,8 +144,13 @@ def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
     from hil.log.reader import read_log
     from hil.reports.run_report import run_report
 
-    evidence = evidence_of_log(read_log(log_path))
+    log = read_log(log_path)
+    evidence = evidence_of_log(log)
     summary = summarise(evidence)
+    if certify:
+        from hil.judge.certified import judge_certified
+
+        summary["certified"] = judge_certified(log, evidence)
     write_json(summary, folder / "summary.json")
     shown = Shown.of(evidence)
     draw_run(shown, summary, folder / "run.png")
