@@ -32,9 +32,11 @@ ODOMETRY_CORRELATION = 0.05
 
 _NS = 1e-9
 _SIZE = 5
+_AT_REST = np.zeros(2)
 _POSE, _MOTION = slice(0, 3), slice(3, 5)
 _GATES = {2: 18.42, 3: 21.11}  # chi-square quantiles of 0.9999, by degrees of freedom
 _REACQUIRE = 5  # poses in a row that do not fit, after which the filter starts anew
+_SETTLING = 2.0  # seconds after which the filter's covariance no longer changes
 _LONGEST = 1.0  # seconds without a pose, after which it does so too
 
 
@@ -124,13 +126,32 @@ def own_motion(track: OwnTrack, capture_ns: int) -> FollowerMotion | None:
     return track[place].motion
 
 
+def steady_noise(
+    noise: OwnNoise, period: float, odometry: FollowerMotion | None = None
+) -> tuple[float, float]:
+    """Standard deviations of v [m/s] and u [rad/s] out of a track of poses that come every ``period`` [s].
+
+    Those of a robot that drives straight on at half its speed, after two seconds; odometry of every pose's
+    moment is fused in if its noise is given.
+    """
+    speed, period_ns = 0.5 * noise.v_max, round(period / _NS)
+    told = odometry and FollowerMotion(speed, 0.0, odometry.sd_v2, odometry.sd_u2)
+    track: OwnTrack = ()
+    for k in range(max(2, math.ceil(_SETTLING / period))):
+        track = fold(track, k * period_ns, Pose(speed * k * period, 0.0, 0.0), told, noise, 0.0)
+    motion = track[-1].motion
+    return motion.sd_v2, motion.sd_u2
+
+
 def _capture_ns(point: OwnPoint) -> int:
     return point.capture_ns
 
 
-def _begun(capture_ns: int, pose: Pose, odometry: FollowerMotion | None, noise: OwnNoise) -> OwnPoint:
-    """Point of one who knows the pose only: at rest, give or take the limits."""
-    mean = np.array([pose.x, pose.y, pose.theta, 0.0, 0.0])
+def _begun(
+    capture_ns: int, pose: Pose, odometry: FollowerMotion | None, noise: OwnNoise, motion: Vector = _AT_REST
+) -> OwnPoint:
+    """Point of one who knows the pose only: in motion (2,) as given, give or take the limits."""
+    mean = np.array([pose.x, pose.y, pose.theta, *motion])
     spread = [noise.pose.position, noise.pose.position, noise.pose.heading, noise.v_max, noise.u_max]
     return OwnPoint(capture_ns, pose, odometry, mean, np.diag(np.square(spread)), capture_ns)
 
@@ -151,7 +172,7 @@ def _follow(
     if updated is None:
         used_ns, rejected = last.used_ns, last.rejected + 1
         if rejected >= _REACQUIRE:
-            return _begun(capture_ns, pose, odometry, noise)
+            return _begun(capture_ns, pose, odometry, noise, mean[_MOTION])
     else:
         mean, covariance = updated
     if odometry is not None:

@@ -70,6 +70,7 @@ _TICK_NS = 50_000_000
 _DIAGNOSTICS_NS = 500_000_000
 _SAME_PLACE = 1e-3  # two robots whose centres are this close [m] are one body under two names
 _NS = 1e-9
+_MOST_RECEIPTS = 4096  # odometry without any frame must not fill the memory; its history is far shorter
 _HISTORY = 2.0  # seconds of own motion kept, enough for the latest frame that the ring can take
 
 REASONS = {
@@ -169,7 +170,8 @@ class EstimatorNode:
         handler = self._handlers.get(event.topic)
         if handler is None:
             return state, ()
-        state = replace(state, receipts=(*state.receipts, consumed(event, now_ns)))
+        receipts = (*state.receipts, consumed(event, now_ns))[-_MOST_RECEIPTS:]
+        state = replace(state, receipts=receipts)
         before = state.track
         try:
             state = handler(state, event.payload, now_ns)
@@ -276,11 +278,12 @@ class EstimatorNode:
     def _add(self, state: EstimatorState, measurement: Measurement, own: OwnTrack = ()) -> EstimatorState:
         late = bool(state.track) and measurement.capture_ns < state.track[-1].measurement.capture_ns
         track, verdict = self.tracker.add(state.track, measurement)
-        if own and verdict not in (Verdict.DUPLICATE, Verdict.LATE):
+        cause = cause_at(track, measurement.capture_ns) if verdict is Verdict.GATED else None
+        # A follower's pose that is not believed must not move its own track either.
+        if own and verdict not in (Verdict.DUPLICATE, Verdict.LATE) and cause in (None, Cause.GATED):
             track = self._retold(state.track, measurement, own) if late else track
             state = replace(state, own=own)
         if verdict in (Verdict.DUPLICATE, Verdict.LATE, Verdict.GATED):
-            cause = cause_at(track, measurement.capture_ns) if verdict is Verdict.GATED else None
             state = replace(state, refused=counted(state.refused, (cause or verdict).value))
         else:
             state = replace(state, taken=counted(state.taken, "used"))

@@ -10,6 +10,9 @@ from estimation.bounds import InputErrors, Perceived, RateErrors
 from estimation.estimate import Estimate
 from estimation.guarantees import guaranteed_rate, leader_acceleration
 from estimation.live_bounds import ErrorBounds, LawConstants, live_bounds
+from estimation.measurement import PoseNoise
+from estimation.motion import FollowerMotion
+from estimation.own_motion import OwnNoise, steady_noise
 from estimation.screening import NO_DOUBT
 from estimation.tracking import Status
 from formation.spacing import Spacing
@@ -42,14 +45,15 @@ class AssumedErrors:
         mocap = given.front_end == "world"
         sd_range = math.sqrt(2.0) * given.sigma_position if mocap else given.sigma_range
         sd_bearing = given.sigma_heading if mocap else given.sigma_bearing
+        sd_v2, sd_u2 = _own_motion_noise(scenario)
         acceleration = float(leader_acceleration(leader.k_v, leader.k_u))
         return AssumedErrors(
             rate=float(guaranteed_rate(_SIGMAS * sd_range, acceleration)),
             sd_range=sd_range,
             sd_bearing=sd_bearing,
             bearing_grows=mocap,
-            E_v2=_SIGMAS * given.sigma_v2,
-            E_u2=_SIGMAS * given.sigma_u2,
+            E_v2=_SIGMAS * sd_v2,
+            E_u2=_SIGMAS * sd_u2,
             law=LawConstants(
                 leader.v_eps,
                 scenario.controller.mu1,
@@ -76,6 +80,16 @@ class AssumedErrors:
         errors = self.errors(rho)
         inputs = InputErrors(errors.E_rho, errors.E_alpha2, errors.E_v2, errors.E_u2)
         return RateErrors(errors.M_rho, errors.M_alpha2), inputs
+
+
+def _own_motion_noise(scenario: Scenario) -> tuple[float, float]:
+    """Standard deviations of v2 [m/s] and u2 [rad/s], by where the estimator has them from."""
+    given, limits = scenario.estimator, scenario.controller
+    if given.own_motion == "odometry":
+        return given.sigma_v2, given.sigma_u2
+    noise = OwnNoise(PoseNoise(given.sigma_position, given.sigma_heading), limits.v_max, limits.u_max)
+    told = FollowerMotion(0.0, 0.0, given.sigma_v2, given.sigma_u2) if given.own_motion == "fused" else None
+    return steady_noise(noise, 1.0 / scenario.mocap.rate_hz, told)
 
 
 def perceived(estimate: Estimate) -> Perceived:

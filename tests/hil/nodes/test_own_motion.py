@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -28,13 +30,14 @@ def node_with(source: str, front_end: str = "world") -> EstimatorNode:
     return EstimatorNode(load_scenario("turtlebot3", overrides))
 
 
-def frames(count: int) -> list[Event]:
+def frames(count: int, flipped: range = range(0)) -> list[Event]:
     generator = np.random.default_rng(2)
     leader, follower, events = Pose(0.3, 0.0, 1.5), Pose(0.7, 0.1, 1.6), []
     for k in range(count):
         shake = generator.normal(size=5) * [3e-4, 3e-4, 3e-4, 3e-4, 3e-3]
         seen = Pose(leader.x + shake[0], leader.y + shake[1], leader.theta)
-        own = Pose(follower.x + shake[2], follower.y + shake[3], follower.theta + shake[4])
+        turned = math.pi if k in flipped else 0.0
+        own = Pose(follower.x + shake[2], follower.y + shake[3], follower.theta + shake[4] + turned)
         message = frame_message(EPOCH_NS + k * FRAME_NS, k, [("leader", seen), ("follower", own)])
         events.append(Event(topics.RIGID_BODIES, encode(message)))
         leader = advance(leader, 0.08, 0.3, FRAME_NS * 1e-9)
@@ -108,3 +111,29 @@ def test_without_odometry_it_does_not_wait_for_any() -> None:
     report = decode_as(node.report(state, now_ns).payload, msg.DiagnosticArray).status[0]
     assert (report.level, report.message) == (0, "ok")
     assert node.tracker.status(state.track, now_ns) is Status.TRACKING
+
+
+@pytest.mark.parametrize(("source", "length"), [("mocap", 1), ("mocap", 40), ("fused", 40)])
+def test_a_heading_that_turns_round_for_a_while_leaves_the_own_track_alone(source: str, length: int) -> None:
+    events = frames(240, flipped=range(120, 120 + length))
+    mixed = [event for k, frame in enumerate(events) for event in (odometry(k, OWN), frame)]
+    state, found = fed(node_with(source), mixed)
+    assert state.refused == {"flipped_heading": length}
+    good = [e for k, e in enumerate(found) if k >= 90 and not 120 <= k < 120 + length]
+    assert max(abs(e.v2 - OWN.v) for e in good) < 0.1
+
+
+def test_bounds_take_the_noise_of_the_source_for_granted() -> None:
+    E_v2 = {source: node_with(source).assumed.E_v2 for source in ("odometry", "mocap", "fused")}
+    assert E_v2["odometry"] == pytest.approx(3.0 * 0.005)
+    assert E_v2["fused"] < E_v2["mocap"]
+    _, found = fed(node_with("mocap"), frames(240))
+    errors = [abs(e.v2 - OWN.v) for e in found[120:]]
+    assert 0.1 * E_v2["mocap"] < max(errors) < E_v2["mocap"]
+
+
+def test_receipts_of_odometry_do_not_pile_up_without_frames() -> None:
+    node, event = node_with("odometry"), odometry(0, OWN)
+    state, _ = fed(node, [event] * 4500)
+    assert len(state.receipts) == 4096
+    assert state.taken == {"odometry": 4500}
