@@ -1,0 +1,19 @@
+"""How far the driven pair strays from the noise-free orbit."""
+
+from __future__ import annotations
+
+import math
+
+from benchmarks.closed_loop import ROWS, drive
+
+
+def test_the_pair_stays_near_the_orbit() -> None:
+    found = drive(ROWS["as shipped"], 30.0)
+    assert found.rho < 2.0e-3
+    assert found.alpha1 < math.radians(1.3)
+
+
+def test_with_0_8_s_of_latency_it_is_still_stable() -> None:
+    found = drive(ROWS["latency 0.8 s, lag 0.15 s"], 20.0)
+    assert found.rho < 0.1
+    assert found.alpha1 < math.radians(20.0)
