@@ -90,7 +90,7 @@ def blank(*, height: int, x_label: str, y_label: str, tools: str, x_range: Range
         toolbar_location="above",
         background_fill_color=None,
         border_fill_color=None,
-        outline_line_color="#bbbbbb",
+        outline_line_color=None,
         min_border_left=58,
         min_border_right=12,
         x_range=x_range,
@@ -104,7 +104,7 @@ def blank(*, height: int, x_label: str, y_label: str, tools: str, x_range: Range
         axis.axis_label_text_font_size = axis.major_label_text_font_size = "12px"
         axis.axis_label_text_color = axis.major_label_text_color = DARK
         axis.axis_label_standoff = 4
-        axis.axis_line_color = None
+        axis.axis_line_color = "#bbbbbb"
         axis.minor_tick_line_color = None
     plot.grid.grid_line_color = "#e4e4e4"
     return plot

@@ -16,7 +16,8 @@ const colours = canvas => {
   if (!canvas.width || !canvas.height) return new Set();
   const pixels = new Uint32Array(
     canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data.buffer);
-  return new Set(pixels.filter(pixel => pixel >>> 24 === 255));
+  const grey = pixel => (pixel & 255) === (pixel >> 8 & 255) && (pixel & 255) === (pixel >> 16 & 255);
+  return new Set(pixels.filter(pixel => pixel >>> 24 === 255 && !grey(pixel)));
 };
 return {
   inks: [...document.querySelectorAll("figure")].map(
@@ -29,7 +30,7 @@ return {
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What a browser shows: colours on the canvas of every figure, width [px], fetched addresses, errors."""
+    """What a browser shows: colours other than grey in every figure, width [px], fetched addresses, errors."""
 
     inks: list[int]
     width: int

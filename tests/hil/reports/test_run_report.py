@@ -24,8 +24,6 @@ from tests.hil.reports.open_page import open_page
 
 NAN = math.nan
 LARGEST_BYTES = 3_000_000
-MOST_EMPTY = 14
-"""Opaque colours on the canvas of a plot that shows nothing but its frame."""
 
 
 def report(evidence: Evidence) -> str:
@@ -59,7 +57,7 @@ def test_a_report_opens_without_a_network_and_fits_the_screen(
     assert seen.fetched == []
     assert seen.width == width
     assert len(seen.inks) == len(titles(written.read_text(encoding="utf-8"))) == 20
-    assert min(seen.inks) > MOST_EMPTY
+    assert min(seen.inks) > 0  # frames, grids and letters are grey
 
 
 def no_truth(evidence: Evidence) -> Evidence:
