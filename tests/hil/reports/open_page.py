@@ -30,7 +30,7 @@ return {
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What a browser shows: colours other than grey in every figure, width [px], fetched addresses, errors."""
+    """What a browser shows: colours other than grey by figure, width [px], fetched addresses, errors."""
 
     inks: list[int]
     width: int
