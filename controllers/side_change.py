@@ -26,7 +26,7 @@ from formation.spacing import lyapunov
 from formation.station import Side, Station
 
 SLACK = 0.3
-"""Error [rho_0] beyond which the phase waits."""
+"""Error [rho_0] beyond which the phase waits; from half of it on it slows down."""
 PACE = 0.5
 """Speed of the place along its circle [v1]."""
 CORRECTION = 0.4
@@ -74,7 +74,9 @@ def change_step(
     error_y = place[1] - shape.rho * math.sin(shape.alpha1)
     error = math.hypot(error_x, error_y)
     left = _way_left(change)
-    pace = math.copysign(PACE * v1 / rho_0, left) if error <= SLACK * rho_0 else 0.0
+    # Faded out, not switched off: a bang-bang pace would make the commands chatter.
+    share = min(1.0, max(0.0, 2.0 - 2.0 * error / (SLACK * rho_0)))
+    pace = math.copysign(share * PACE * v1 / rho_0, left)
     moved = left if abs(left) <= abs(pace) * dt else pace * dt
     turning = u1 + moved / dt
     gain = min(gains.mu1, CORRECTION * v1 / error) if error > 0.0 else 0.0

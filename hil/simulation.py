@@ -43,7 +43,12 @@ def simulate(scenario: Scenario, out: Path | None, *, stability: bool = False) -
     except IntegrationError as error:
         raise CheckFailedError(f"scenario {scenario.name}: {error}; check gains and start poses") from error
     program, law = scenario_parts.leader_program(scenario), scenario_parts.follower_law(scenario)
-    orbit = find_orbit(program, law, scenario.formation.rho_0, scenario_parts.station(scenario))
+    changes = scenario.formation.change_sides_at_s
+    orbit = (
+        None
+        if changes
+        else find_orbit(program, law, scenario.formation.rho_0, scenario_parts.station(scenario))
+    )
     report = _report(scenario, trajectory, orbit)
     if out is not None:
         _write(scenario, trajectory, orbit, out)

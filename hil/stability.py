@@ -70,6 +70,11 @@ def stability_of(scenario: Scenario, trajectory: Trajectory) -> Stability:
             f"scenario {scenario.name}: formation has side {scenario.formation.side!r} and bearing "
             f"{scenario.formation.bearing}, expected a follower abreast on the right; leave out --stability"
         )
+    if scenario.formation.change_sides_at_s:
+        raise UsageError(
+            f"scenario {scenario.name}: formation.change_sides_at_s is set, but the propositions are about "
+            "one side; leave out --stability"
+        )
     gains, limits = scenario_parts.gains(scenario), scenario_parts.limits(scenario)
     v1 = scenario_parts.leader_program(scenario)(0.0).v
     if not v1 > 0.0:

@@ -132,7 +132,8 @@ def draw_bearings(axes: Axes, scenario: Scenario, trajectory: Trajectory) -> Non
         (trajectory.alpha1, wanted.alpha1, LEADER, r"$\alpha_1$"),
         (trajectory.alpha2, wanted.alpha2, FOLLOWER, r"$\alpha_2$"),
     ):
-        axes.axhline(desired, color=colour, lw=1.0, ls="--", alpha=0.8)
+        for side in (desired, -desired) if scenario.formation.change_sides_at_s else (desired,):
+            axes.axhline(side, color=colour, lw=1.0, ls="--", alpha=0.8)
         axes.plot(trajectory.t, _broken_at_jumps(angle), color=colour, lw=1.4, label=label)
     low = (
         min(float(trajectory.alpha1.min()), float(trajectory.alpha2.min()), wanted.alpha1, wanted.alpha2)
@@ -151,7 +152,10 @@ def draw_bearings(axes: Axes, scenario: Scenario, trajectory: Trajectory) -> Non
 
 def draw_speed(axes: Axes, scenario: Scenario, trajectory: Trajectory) -> None:
     """Follower's speed over time; dashed what holds the station: v1 + rho_0 u1 abreast on the right."""
-    desired = trajectory.v1 + scenario.formation.rho_0 * trajectory.u1 / station(scenario).sin
+    across = np.full(len(trajectory.t), station(scenario).sin)
+    if scenario.formation.change_sides_at_s:
+        across = np.copysign(across, trajectory.alpha2)
+    desired = trajectory.v1 + scenario.formation.rho_0 * trajectory.u1 / across
     _draw_control(axes, trajectory.t, trajectory.v2, desired, scenario.controller.v_max)
     axes.set_ylabel("$v_2$ [m/s]")
 

@@ -47,7 +47,7 @@ def build_scenario(
 def refuse_unrunnable(scenario: Scenario) -> None:
     """Raise :class:`UsageError` if the scenario can be simulated or replayed only, not driven.
 
-    That is one with an estimator that needs to know the future, or with a chain of agents.
+    That is one with an estimator that needs to know the future, a chain of agents, or changes of side.
     """
     kind = scenario.estimator.kind
     if kind in OFFLINE_ESTIMATORS:
@@ -59,6 +59,11 @@ def refuse_unrunnable(scenario: Scenario) -> None:
         raise UsageError(
             f"scenario {scenario.name}: it has a [chain] of {scenario.chain.agents} agents, expected a pair; "
             f"abreast simulate {scenario.name} runs the chain"
+        )
+    if scenario.formation.change_sides_at_s:
+        raise UsageError(
+            f"scenario {scenario.name}: formation.change_sides_at_s is set, expected none: daemons cannot be "
+            f"told to change sides; abreast simulate {scenario.name} shows it"
         )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from controllers.chain import ChainTrajectory, simulate_chain
 from controllers.laws import LAWS, Gains
 from controllers.limits import Limits
+from controllers.side_change_run import run_with_changes
 from formation.angles import FloatArray
 from formation.closed_loop import FollowerLaw, Trajectory, simulate_pair
 from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
@@ -81,9 +82,23 @@ def follower_law(scenario: Scenario) -> FollowerLaw:
 def noise_free_run(scenario: Scenario, times: FloatArray) -> Trajectory:
     """Trajectory of the pair without noise, delay and limits, at the given times [s] from its start.
 
+    With changes of side it keeps to the limits, and commands are held between steps.
+
     Raises :class:`~formation.closed_loop.IntegrationError` if the motion breaks down.
     """
-    return simulate_pair(*start_poses(scenario), leader_program(scenario), follower_law(scenario), times)
+    program, changes = leader_program(scenario), scenario.formation.change_sides_at_s
+    if not changes:
+        return simulate_pair(*start_poses(scenario), program, follower_law(scenario), times)
+    return run_with_changes(
+        *start_poses(scenario),
+        program,
+        LAWS[scenario.controller.law],
+        gains(scenario),
+        limits(scenario),
+        changes,
+        times,
+        knows_turn=scenario.controller.law == "ideal",
+    )
 
 
 def chain_run(scenario: Scenario, agents: int, times: FloatArray) -> ChainTrajectory:

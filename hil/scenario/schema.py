@@ -43,11 +43,13 @@ class FormationSection(_Section, frozen=True, kw_only=True):
     """The follower's station: its distance rho_0 [m], the leader's side, and the bearing it keeps it at.
 
     ``bearing``: angle [rad] between the follower's heading and the line to the leader, pi/2 abreast.
+    ``change_sides_at_s``: when the follower is told to go to the other side; in simulations of a pair only.
     """
 
     rho_0: Positive
     side: Literal["right", "left"] = "right"
     bearing: Annotated[float, Meta(gt=0.0, lt=math.pi)] = 0.5 * math.pi
+    change_sides_at_s: tuple[NonNegative, ...] = ()
 
 
 class ControllerSection(_Section, frozen=True, kw_only=True):
