@@ -16,6 +16,7 @@ COMMANDS = {
     "replay": "run a log through the same steps: verify it, re-estimate it, judge it",
     "simulate": "the noise-free experiments of the paper, with pictures",
     "bounds": "the certificate: what is guaranteed of estimates and formation, and on what it rests",
+    "sweep": "Monte Carlo over noise against the bounds, on this machine or a cluster",
     "import": "turn other recordings into logs",
     "calibrate": "find the offsets of a range and bearing sensor that mocap has watched",
     "recover": "make a cut-off log whole",

@@ -1,0 +1,113 @@
+"""``abreast sweep``: Monte Carlo over noise against the bounds, on this machine or a cluster."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+
+from hil.errors import UsageError
+from hil.report_json import print_json
+from hil.sweep.spec import Sweep, load_sweep, run_seed
+
+
+@click.command("sweep")
+@click.argument("spec", default="default")
+@click.option("--runs", type=click.IntRange(min=1), metavar="N", help="Runs of every cell.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all noise.")
+@click.option("--duration", type=click.FloatRange(min=1.0), metavar="S", help="Seconds of every run.")
+@click.option("--estimators", metavar="A,B", help="Estimators, of ekf, ukf and difference.")
+@click.option(
+    "--workers", type=click.IntRange(min=1), metavar="N", help="Processes [as many as there are processors]."
+)
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="Dask scheduler to send the work to, like tcp://host:8786."
+)
+@click.option("--keep", "kept", multiple=True, metavar="CELL:RUN", help="Also write this run as a full log.")
+@click.option(
+    "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Folder for results."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the results as one JSON object on stdout.")
+def command(
+    spec: str,
+    runs: int | None,
+    seed: int | None,
+    duration: float | None,
+    estimators: str | None,
+    workers: int | None,
+    scheduler: str | None,
+    kept: tuple[str, ...],
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Fly many runs of every cell of SPEC (a shipped name or a TOML file), and judge them.
+
+    Given the same --out again, a sweep that was interrupted goes on. Cells and runs count from 0.
+    """
+    names = None if estimators is None else [name.strip() for name in estimators.split(",")]
+    sweep = load_sweep(spec, runs=runs, seed=seed, duration_s=duration, estimators=names)
+    to_keep = [_parsed(sweep, text) for text in kept]
+    folder = out or Path("runs") / f"sweep-{time.strftime('%Y%m%d-%H%M%S')}"
+    result = _fly(sweep, folder, workers or len(os.sched_getaffinity(0)), scheduler)
+    for cell, run in to_keep:
+        _keep(sweep, folder, cell, run)
+    if as_json:
+        print_json(result)
+
+
+def _parsed(sweep: Sweep, text: str) -> tuple[int, int]:
+    cell, colon, run = text.partition(":")
+    cells, runs = len(sweep.cells()), sweep.spec.runs
+    if not (colon and cell.isdecimal() and run.isdecimal() and int(cell) < cells and int(run) < runs):
+        raise UsageError(
+            f"--keep {text!r}: expected CELL:RUN with a cell of 0 to {cells - 1} and a run of 0 to {runs - 1}"
+        )
+    return int(cell), int(run)
+
+
+def _fly(sweep: Sweep, folder: Path, workers: int, scheduler: str | None) -> dict[str, Any]:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    from hil.sweep.results import fly_sweep
+
+    console = Console(file=sys.stderr)
+    columns = (TextColumn("{task.completed:.0f} of {task.total:.0f} runs"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, TextColumn("to go"), TimeRemainingColumn(), console=console) as bar:
+        task = bar.add_task("runs", total=sweep.spec.runs * len(sweep.cells()))
+        result = fly_sweep(
+            sweep,
+            folder,
+            workers=workers,
+            scheduler=scheduler,
+            progress=lambda done: bar.update(task, completed=done),
+        )
+    _say(console, result, folder)
+    return result
+
+
+def _say(console: Any, result: dict[str, Any], folder: Path) -> None:
+    cells = result["cells"]
+    violations: dict[str, int] = {}
+    for cell in cells:
+        for name, count in cell["bounds"]["violations"].items():
+            violations[name] = violations.get(name, 0) + count
+    samples, diverged = (sum(cell[name] for cell in cells) for name in ("samples", "diverged"))
+    speed = result["run_seconds"] / result["wall_s"]
+    console.print(f"{len(cells)} cells, {samples} samples, {diverged} runs diverged")
+    console.print("outside their bounds: " + ", ".join(f"{name} {n}" for name, n in violations.items()))
+    console.print(f"{result['run_seconds']:.0f} s of runs in {result['wall_s']:.1f} s ({speed:.0f} to 1)")
+    console.print(f"results in {folder}", soft_wrap=True)
+
+
+def _keep(sweep: Sweep, folder: Path, cell: int, run: int) -> None:
+    """Write a run of the sweep as the log of a lockstep run with its seed."""
+    from hil.nodes.lockstep_run import run_lockstep
+
+    path = folder / f"run-{cell}-{run}.mcap"
+    run_lockstep(sweep.scenario_of(sweep.cells()[cell], run_seed(sweep.spec.seed, run)), path)
+    click.echo(f"kept {path}", err=True)

@@ -1,0 +1,76 @@
+"""From the tallies of a cell's runs to its part of the results."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.estimate import QUANTITIES
+from hil.report_json import known
+from hil.sweep.spec import Cell
+from hil.sweep.tally import BOUNDS
+
+
+def report_cell(cell: Cell, tallies: NDArray[np.void], allowed: tuple[float, float] | None) -> dict[str, Any]:
+    """Figures of a cell, from one tally for each run in the order of the runs.
+
+    ``rmse`` and ``coverage_3sigma`` over all samples of all runs, those of diverged runs too. ``efficiency``:
+    RMSE over the root mean square of the posterior Cramer-Rao bound. ``tightness``: the largest of all runs.
+    ``formation.deviation``: RMS off the noise-free run. ``formation.certified``: share of moments at which
+    the distance was in the certificate's set; absent where it has none.
+    """
+    samples = int(tallies["samples"].sum())
+    squares, best = _total(tallies["squares"]), _total(tallies["best_sum"])
+    best_count, moments = int(tallies["best_count"].sum()), int(tallies["moments"].sum())
+    rmse = {name: _root(each, samples) for name, each in zip(QUANTITIES, squares, strict=True)}
+    least = {name: _root(each, best_count) for name, each in zip(QUANTITIES, best, strict=True)}
+    point = asdict(cell)
+    point.pop("index")
+    result: dict[str, Any] = known(
+        {
+            **point,
+            "runs": len(tallies),
+            "samples": samples,
+            "untracked": int(tallies["untracked"].sum()),
+            "diverged": int(tallies["diverged"].sum()),
+            "rmse": rmse,
+            "efficiency": {name: rmse[name] / least[name] for name in rmse if least[name] > 0.0},
+            "coverage_3sigma": {
+                name: count / samples if samples else None
+                for name, count in zip(QUANTITIES, _total(tallies["covered"]), strict=True)
+            },
+            "nis_mean": _mean(tallies["nis_sum"], tallies["nis_count"]),
+            "bounds": {
+                "violations": dict(zip(BOUNDS, map(int, _total(tallies["violations"])), strict=True)),
+                "tightness": dict(zip(BOUNDS, tallies["tightness"].max(axis=0).tolist(), strict=True)),
+            },
+            "formation": {
+                "rho_min": float(tallies["rho_min"].min()),
+                "rho_max": float(tallies["rho_max"].max()),
+                "deviation": {
+                    "rho": _root(sum(tallies["rho_off_sum"].tolist()), moments),
+                    "alpha1": _root(sum(tallies["alpha1_off_sum"].tolist()), moments),
+                },
+                "certified": int(tallies["inside"].sum()) / moments if allowed and moments else None,
+            },
+        }
+    )
+    return result
+
+
+def _total(columns: NDArray[Any]) -> list[float]:
+    """Sum over the runs, in their order."""
+    return [sum(column) for column in columns.T.tolist()]
+
+
+def _root(total: float, count: int) -> float:
+    return math.sqrt(total / count) if count else math.nan
+
+
+def _mean(totals: NDArray[Any], counts: NDArray[Any]) -> float | None:
+    count = int(counts.sum())
+    return sum(totals.tolist()) / count if count else None

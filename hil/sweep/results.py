@@ -1,0 +1,74 @@
+"""The results of a sweep: flown or gone on with, and written as JSON and as a Parquet table."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hil.report_json import write_json
+from hil.sweep.cell_report import report_cell
+from hil.sweep.spec import Sweep, spec_json
+from hil.sweep.work import Store, allowed_distances, pieces_of
+from hil.sweep.workers import fly_here, fly_on_cluster
+
+Progress = Callable[[int], None]
+"""Called with the number of runs done so far."""
+
+
+def fly_sweep(
+    sweep: Sweep, folder: Path, *, workers: int = 1, scheduler: str | None = None, progress: Progress
+) -> dict[str, Any]:
+    """JSON of a sweep, after doing what of it is not in the folder yet; ``results.*`` are written there.
+
+    ``run_seconds`` and ``wall_s`` are of this call.
+    """
+    begun = time.perf_counter()
+    store = Store(folder, sweep)
+    pieces = list(pieces_of(sweep))
+    found = {piece: store.load(piece) for piece in pieces}
+    missing = [piece for piece in pieces if found[piece] is None]
+    total = sweep.spec.runs * len(sweep.cells())
+    done = total - sum(piece.last - piece.first for piece in missing)
+    before = done
+    progress(done)
+    fly = fly_on_cluster(sweep, missing, scheduler) if scheduler else fly_here(sweep, missing, workers)
+    for piece, tallies in fly if missing else ():
+        store.save(piece, tallies)
+        found[piece] = tallies
+        done += len(tallies)
+        progress(done)
+    cells = []
+    for cell in sweep.cells():
+        tallies = np.concatenate([found[piece] for piece in pieces if piece.cell == cell])
+        cells.append(report_cell(cell, tallies, allowed_distances(sweep.scenario_of(cell))))
+    result = {
+        "cells": cells,
+        "run_seconds": (done - before) * sweep.spec.duration_s,
+        "wall_s": time.perf_counter() - begun,
+    }
+    write_json({"spec": spec_json(sweep.spec), **result}, folder / "results.json")
+    write_table(cells, folder / "results.parquet")
+    return result
+
+
+def write_table(cells: list[dict[str, Any]], path: Path) -> None:
+    """Write one row for each cell; what is nested gets names like ``rmse.v1``."""
+    import pyarrow
+    from pyarrow import parquet
+
+    rows = [dict(_flat(cell)) for cell in cells]
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    table = pyarrow.table({name: [row.get(name) for row in rows] for name in names})
+    parquet.write_table(table, path)
+
+
+def _flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value

@@ -1,0 +1,164 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from pyarrow import parquet
+
+from hil.errors import UsageError
+from hil.judge.evidence import evidence_of_log
+from hil.judge.summary import summarise
+from hil.log.reader import read_log
+from hil.nodes.lockstep_run import run_lockstep
+from hil.sweep.results import fly_sweep
+from hil.sweep.spec import Sweep, run_seed
+from hil.sweep.work import Piece, Store, pieces_of
+from hil.sweep.workers import fly_here, fly_on_cluster
+
+GRID = """
+runs = 4
+duration_s = 8.0
+estimators = ["ekf", "ukf", "difference"]
+
+[grid]
+sigma_position = [0.0003, 0.002]
+sigma_heading = [0.0035, 0.02]
+latency_s = [0.03]
+loss = [0.0, 0.1]
+"""
+LONG = """
+runs = 50
+duration_s = 20.0
+
+[grid]
+sigma_position = [0.0003, 0.0005, 0.001, 0.002, 0.003, 0.005]
+sigma_heading = [0.0035]
+"""
+HOLD = ("v1", "alpha1", "h", "v1_extended", "alpha1_extended", "h_extended")
+
+
+def flown(sweep: Sweep, folder: Path, **options: Any) -> dict[str, Any]:
+    return fly_sweep(sweep, folder, progress=lambda done: None, **options)
+
+
+def test_a_cell_of_one_run_has_the_figures_of_its_lockstep_run(
+    make_sweep: Callable[..., Sweep], tmp_path: Path
+) -> None:
+    sweep = make_sweep(runs=1)
+    for cell, found in zip(sweep.cells(), flown(sweep, tmp_path)["cells"], strict=True):
+        log = tmp_path / f"{cell.index}.mcap"
+        run_lockstep(sweep.scenario_of(cell, run_seed(sweep.spec.seed, 0)), log)
+        wanted = summarise(evidence_of_log(read_log(log)))
+        estimation, bounds = wanted["estimation"], wanted["bounds"]
+        assert found["samples"] == estimation["samples"]
+        for name in ("rmse", "coverage_3sigma", "efficiency"):
+            assert found[name] == pytest.approx(estimation[name], rel=1e-6)
+        assert found["nis_mean"] == pytest.approx(estimation["nis_mean"], rel=1e-9)
+        assert found["bounds"]["violations"] == bounds["violations"]
+        assert found["bounds"]["tightness"] == pytest.approx(bounds["tightness"], rel=1e-6)
+        formation = wanted["formation"]
+        assert found["formation"]["rho_max"] == pytest.approx(formation["rho_max"], rel=1e-9)
+        assert found["formation"]["deviation"] == pytest.approx(formation["orbit_deviation_rms"], rel=1e-3)
+
+
+def test_every_sound_and_extended_bound_holds_over_a_grid_of_noise(
+    make_sweep: Callable[..., Sweep], tmp_path: Path
+) -> None:
+    cells = flown(make_sweep(GRID), tmp_path)["cells"]
+    assert len(cells) == 24
+    for cell in cells:
+        assert cell["samples"] + cell["untracked"] > 1700
+        assert {name: cell["bounds"]["violations"][name] for name in HOLD} == dict.fromkeys(HOLD, 0)
+        if cell["estimator"] != "difference":
+            assert cell["diverged"] == 0
+            assert cell["samples"] > 1700
+            assert 1.7 < cell["nis_mean"] < 2.2
+            assert min(cell["coverage_3sigma"].values()) > 0.99
+
+
+def test_an_interrupted_sweep_goes_on_and_ends_the_same(
+    make_sweep: Callable[..., Sweep], tmp_path: Path
+) -> None:
+    sweep = make_sweep()
+    whole = flown(sweep, tmp_path / "whole")
+    cut, pieces = tmp_path / "cut", list(pieces_of(sweep))
+    store = Store(cut, sweep)
+    for piece, tallies in fly_here(sweep, pieces[1:2], 1):
+        store.save(piece, tallies)
+    (cut / "parts" / pieces[0].name).write_bytes(b"half a file")
+    again = flown(sweep, cut)
+    assert again["cells"] == whole["cells"]
+    assert again["run_seconds"] == (len(pieces) - 1) * 3 * 5.0
+    assert json.loads((cut / "results.json").read_text())["cells"] == whole["cells"]
+    table = parquet.read_table(cut / "results.parquet").to_pylist()
+    assert [row["rmse.v1"] for row in table] == [cell["rmse"]["v1"] for cell in whole["cells"]]
+    with pytest.raises(UsageError, match="another sweep"):
+        flown(make_sweep(seed=5), cut)
+
+
+def test_two_workers_give_the_bits_of_one(make_sweep: Callable[..., Sweep], tmp_path: Path) -> None:
+    sweep = make_sweep()
+    one, two = flown(sweep, tmp_path / "one"), flown(sweep, tmp_path / "two", workers=2)
+    assert one["cells"] == two["cells"]
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """Address of a Dask scheduler on this machine, and the processes of its two workers."""
+    file = tmp_path / "scheduler.json"
+    module = [sys.executable, "-m"]
+    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
+    options = ["--no-dashboard", "--scheduler-file", str(file)]
+    scheduler = subprocess.Popen(
+        [*module, "distributed.cli.dask_scheduler", *options, "--host", "127.0.0.1", "--port", "0"], **quiet
+    )
+    worker = [*module, "distributed.cli.dask_worker", "--no-nanny", "--nthreads", "1", *options]
+    workers = [subprocess.Popen(worker, **quiet) for _ in range(2)]
+    try:
+        give_up = time.monotonic() + 30.0
+        while not file.exists() and time.monotonic() < give_up:
+            time.sleep(0.05)
+        yield json.loads(file.read_text())["address"], workers
+    finally:
+        for process in (*workers, scheduler):
+            process.kill()
+            process.wait()
+
+
+def test_a_cluster_that_loses_a_worker_loses_nothing(
+    make_sweep: Callable[..., Sweep], cluster: tuple[str, list[subprocess.Popen[bytes]]]
+) -> None:
+    address, workers = cluster
+    sweep = make_sweep(LONG)
+    pieces = list(pieces_of(sweep))
+    found: dict[Piece, NDArray[np.void]] = {}
+    for piece, tallies in fly_on_cluster(sweep, pieces, address):
+        if not found:
+            workers[0].kill()
+        found[piece] = tallies
+    for piece, tallies in fly_here(sweep, pieces, 1):
+        np.testing.assert_array_equal(found[piece], tallies)
+    assert len(found) == len(pieces)
+
+
+def test_a_scheduler_that_is_not_there_is_a_usage_error(make_sweep: Callable[..., Sweep]) -> None:
+    sweep = make_sweep()
+    with pytest.raises(UsageError, match="not reachable"):
+        list(fly_on_cluster(sweep, list(pieces_of(sweep)), "nonsense://127.0.0.1:1"))
+
+
+def test_without_dask_the_error_says_what_to_install(
+    make_sweep: Callable[..., Sweep], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    sweep = make_sweep()
+    with pytest.raises(UsageError, match=r"abreast\[cluster\]"):
+        list(fly_on_cluster(sweep, list(pieces_of(sweep)), "tcp://127.0.0.1:1"))
