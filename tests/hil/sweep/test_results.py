@@ -35,8 +35,8 @@ latency_s = [0.03]
 loss = [0.0, 0.1]
 """
 LONG = """
-runs = 50
-duration_s = 20.0
+runs = 40
+duration_s = 10.0
 
 [grid]
 sigma_position = [0.0003, 0.0005, 0.001, 0.002, 0.003, 0.005]
