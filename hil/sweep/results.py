@@ -41,10 +41,10 @@ def fly_sweep(
         found[piece] = tallies
         done += len(tallies)
         progress(done)
-    cells = []
+    cells, allowed = [], allowed_distances(sweep.scenario)
     for cell in sweep.cells():
         tallies = np.concatenate([found[piece] for piece in pieces if piece.cell == cell])
-        cells.append(report_cell(cell, tallies, allowed_distances(sweep.scenario_of(cell))))
+        cells.append(report_cell(cell, tallies, allowed))
     result = {
         "cells": cells,
         "run_seconds": (done - before) * sweep.spec.duration_s,

@@ -49,7 +49,7 @@ def pieces_of(sweep: Sweep) -> Iterator[Piece]:
 def fly_piece(sweep: Sweep, piece: Piece) -> NDArray[np.void]:
     """Tallies of the runs of a piece; they depend on nothing else."""
     scenario = sweep.scenario_of(piece.cell)
-    engine, allowed, orbit = Engine(scenario), allowed_distances(scenario), orbit_of(scenario)
+    engine, allowed, orbit = Engine(scenario), allowed_distances(sweep.scenario), orbit_of(scenario)
     tallies = np.zeros(piece.last - piece.first, TALLY)
     for row, run in enumerate(range(piece.first, piece.last)):
         tallies[row] = judge_run(engine, engine.fly(run_seed(sweep.spec.seed, run)), allowed, orbit)[0]
@@ -57,11 +57,11 @@ def fly_piece(sweep: Sweep, piece: Piece) -> NDArray[np.void]:
 
 
 def allowed_distances(scenario: Scenario) -> tuple[float, float] | None:
-    """Distances of the certificate's invariant set; None where it guarantees none."""
+    """Distances of the certificate's invariant set, which no noise changes; None where it has none."""
     return _allowed(scenario_text(scenario))
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=4)
 def _allowed(text: str) -> tuple[float, float] | None:
     figures = certificate_of(build_scenario(tomllib.loads(text))).claims()["formation"].figures
     return (figures["rho_min"], figures["rho_max"]) if figures else None
