@@ -104,8 +104,8 @@ def main() -> None:
     took = []
     for _ in range(given.rounds):
         python = seconds(lambda: fly_in_python(peer))
-        compiled = min(seconds(lambda: engine.fly(SEED)) for _ in range(20))
-        took.append((python, compiled, min(seconds(judged) for _ in range(10))))
+        compiled = np.median([seconds(lambda: engine.fly(SEED)) for _ in range(50)])
+        took.append((python, compiled, np.median([seconds(judged) for _ in range(20)])))
     speeds = given.duration / np.array(took)
     python, compiled, with_judge = np.median(speeds, axis=0)
     ratio = float(np.median(speeds[:, 1] / speeds[:, 0]))
