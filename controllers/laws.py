@@ -114,7 +114,8 @@ def independent(shape: Shape, v1: float, u1: float, gains: Gains, limits: Limits
     return _steered(shape, v1, independent_speed(shape, v1, gains), gains, limits)
 
 
-LAWS: Mapping[str, Law] = MappingProxyType({"independent": independent, "ideal": ideal})
+LAWS: Mapping[str, Law] = MappingProxyType({"independent": independent, "ideal": ideal, "feedforward": ideal})
+"""Laws by name. ``ideal`` and ``feedforward`` are one law, the one told u1 and the other estimating it."""
 
 
 def _steered(shape: Shape, v1: float, v2: float, gains: Gains, limits: Limits | None) -> Motion:

@@ -211,7 +211,7 @@ def _share_time(rows: list[Axes], trajectory: Trajectory) -> None:
 
 def _figure(scenario: Scenario, trajectory: Trajectory, width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height), layout="constrained")
-    proposition = {"ideal": "Prop. 1", "independent": "Prop. 2"}[scenario.controller.law]
+    proposition = "Prop. 2" if scenario.controller.law == "independent" else "Prop. 1"
     figure.suptitle(
         f"{scenario.name}: {scenario.controller.law} law ({proposition}), noise-free, {trajectory.t[-1]:g} s",
         fontsize=11,

@@ -10,11 +10,13 @@ from formation.angles import FloatArray, wrap
 from hil.judge.columns import Columns, inside
 from hil.judge.evidence import Evidence
 from hil.judge.noise_free_orbit import noise_free_orbit
+from hil.scenario.parts import station
 
 
 def judge_formation(evidence: Evidence, columns: Columns) -> dict[str, object]:
     """The ``formation`` part of a summary, from the truth within the evaluation; empty without truth.
 
+    ``equilibrium_deviation_rms`` from rho_0 and the station's alpha1, where the law ``ideal`` settles.
     ``orbit_deviation_rms`` against :func:`hil.judge.noise_free_orbit.noise_free_orbit`, for emulated runs.
     """
     truth, span = columns.truth, columns.span
@@ -28,6 +30,10 @@ def judge_formation(evidence: Evidence, columns: Columns) -> dict[str, object]:
         "alpha2_final": float(alpha2[-1]),
         "rho_min": float(rho.min()),
         "rho_max": float(rho.max()),
+        "equilibrium_deviation_rms": {
+            "rho": _rms(rho - evidence.scenario.formation.rho_0),
+            "alpha1": _rms(wrap(alpha1 - station(evidence.scenario).alpha1)),
+        },
     }
     driven = evidence.motion_since_ns is not None
     orbit = noise_free_orbit(evidence.scenario, truth, columns.run) if driven else None

@@ -32,6 +32,8 @@ _SCALARS = (
     ("formation.rho_final", "ρ at the end", "m", 1.0),
     ("formation.alpha1_final", "α₁ at the end", "deg", degrees(1.0)),
     ("formation.alpha2_final", "α₂ at the end", "deg", degrees(1.0)),
+    ("formation.equilibrium_deviation_rms.rho", "ρ off ρ₀, RMS", "mm", 1e3),
+    ("formation.equilibrium_deviation_rms.alpha1", "α₁ off its station, RMS", "deg", degrees(1.0)),
     ("formation.orbit_deviation_rms.rho", "ρ off the noise-free run, RMS", "mm", 1e3),
     ("formation.orbit_deviation_rms.alpha1", "α₁ off the noise-free run, RMS", "deg", degrees(1.0)),
     ("latency_ms.capture_to_command.p50", "capture to command, median", "ms", 1.0),

@@ -7,7 +7,7 @@ one place) is answered here, with a :class:`~hil.errors.UsageError` that names t
 from __future__ import annotations
 
 from controllers.chain import ChainTrajectory, simulate_chain
-from controllers.laws import LAWS, Gains
+from controllers.laws import LAWS, Gains, independent
 from controllers.limits import Limits
 from controllers.side_change_run import run_with_changes
 from formation.angles import FloatArray
@@ -115,5 +115,5 @@ def chain_run(scenario: Scenario, agents: int, times: FloatArray) -> ChainTrajec
         gains(scenario),
         limits(scenario),
         times,
-        knows_turn=scenario.controller.law == "ideal",
+        knows_turn=LAWS[scenario.controller.law] is not independent,
     )

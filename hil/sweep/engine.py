@@ -24,7 +24,7 @@ from hil.scenario.schema import ConstantProgram, ImpulseProgram, Scenario, Sinus
 from hil.sweep import engine_kernels as kernels
 
 KINDS = {"ekf": kernels.EKF, "ukf": kernels.UKF, "difference": kernels.DIFFERENCE}
-LAWS = {"independent": kernels.INDEPENDENT, "ideal": kernels.IDEAL}
+LAWS = {"independent": kernels.INDEPENDENT, "ideal": kernels.IDEAL, "feedforward": kernels.FEEDFORWARD}
 LONGEST_LATENCY = 1.0
 """Seconds of latency that the history of odometry surely covers."""
 

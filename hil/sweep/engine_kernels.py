@@ -30,7 +30,7 @@ Record = Any
 _F = TypeVar("_F", bound=Callable[..., object])
 
 EKF, UKF, DIFFERENCE = 0, 1, 2
-INDEPENDENT, IDEAL = 0, 1
+INDEPENDENT, IDEAL, FEEDFORWARD = 0, 1, 2
 CONSTANT, SINUSOID, IMPULSE, TABLE = 0, 1, 2, 3
 INITIALISING, TRACKING, COASTING, REJECTING, LOST = 0, 1, 2, 3, 4
 DRIVING, STOPPED, NO_ESTIMATE, GIVEN_UP, NOT_SETTLED, STALE, NOT_FINITE = 0, 1, 2, 3, 4, 5, 6
@@ -967,7 +967,7 @@ def _law(
     """Wanted speed and turn rate; ``one``, ``two``: cosine and sine of alpha1 and alpha2."""
     f = rules.mu_rho * ((rho - rules.rho_0) / rho) * ((rho + rules.rho_0) / rho)
     v2 = -v1 * one[1] + rho * (v1 * f - rules.mu1 * one[0])
-    if rules.law == IDEAL:
+    if rules.law != INDEPENDENT:
         v2 += rho * leader_u1
     driven = v2
     if v2 > rules.v_limit:
@@ -997,7 +997,8 @@ def _wanted(loop: Record, rules: Record, sent: int, arcs: int, now_ns: int) -> t
     rho = math.sqrt(dx * dx + dy * dy)
     one = (dx * lc + dy * ls) / rho, (dy * lc - dx * ls) / rho
     two = -(dx * fc + dy * fs) / rho, (dx * fs - dy * fc) / rho
-    return _law(rules, loop.leader_u1, v1, rho, one, two)
+    leader_u1 = loop.leader_u1 if rules.law == IDEAL else loop.u1
+    return _law(rules, leader_u1, v1, rho, one, two)
 
 
 @_compiled()

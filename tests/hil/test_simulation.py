@@ -40,6 +40,10 @@ def test_ideal_law_of_fig2() -> None:
     assert report["final"]["alpha2"] == pytest.approx(math.pi / 2, abs=1e-12)
 
 
+def test_without_an_estimator_feed_forward_is_the_ideal_law() -> None:
+    assert report_of("fig2-ideal", "controller.law=feedforward") == report_of("fig2-ideal")
+
+
 def test_ideal_law_brings_the_robots_to_the_equilibrium() -> None:
     final = report_of("turtlebot3", "controller.law=ideal")["final"]
     assert final["rho"] == pytest.approx(0.2, abs=1e-9)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from estimation.tracking import Status
 from hil.judge.evidence import Evidence, evidence_of_log
@@ -15,6 +16,7 @@ from hil.judge.summary import summarise
 from hil.log.metadata import recorded_certificate
 from hil.log.reader import Log
 from hil.report_json import as_json
+from hil.scenario.schema import FormationSection
 from hil.wire.messages import to_ns, to_time
 
 QUANTITIES = {"rho_dot", "alpha2_dot", "v1", "alpha1", "u1"}
@@ -59,7 +61,7 @@ def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
         "certificate": parts["certificate"],
         "formation": {
             *("rho_final", "alpha1_final", "alpha2_final", "rho_min", "rho_max"),
-            "orbit_deviation_rms",
+            *("equilibrium_deviation_rms", "orbit_deviation_rms"),
         },
         "latency_ms": {"capture_to_command"},
         "clock": {"offset_ms", "jitter_ms", "jumps"},
@@ -78,6 +80,7 @@ def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
         assert set(judged["estimation"][name]) == QUANTITIES
     assert set(judged["bounds"]["violations"]) == BOUNDS
     assert set(judged["formation"]["orbit_deviation_rms"]) == {"rho", "alpha1"}
+    assert set(judged["formation"]["equilibrium_deviation_rms"]) == {"rho", "alpha1"}
     assert set(judged["latency_ms"]["capture_to_command"]) == {"p50", "p99", "max"}
     assert set(judged["clock"]["jitter_ms"]) == {"p50", "p99", "max"}
     assert as_json(judged)
@@ -113,6 +116,15 @@ def test_exact_estimates_have_no_error(exact_evidence: Evidence) -> None:
     assert set(summary["bounds"]["violations"].values()) == {0}
     assert summary["formation"]["rho_final"] == pytest.approx(0.2)
     assert summary["formation"]["alpha1_final"] == pytest.approx(-0.5 * math.pi)
+    assert summary["formation"]["equilibrium_deviation_rms"] == pytest.approx({"rho": 0.0, "alpha1": 0.0})
+
+
+def test_the_equilibrium_is_that_of_the_station(exact_evidence: Evidence) -> None:
+    given = exact_evidence.scenario
+    elsewhere = structs.replace(given, formation=FormationSection(rho_0=0.17, bearing=1.2))
+    found = summarise(replace(exact_evidence, scenario=elsewhere))["formation"]
+    off = {"rho": 0.03, "alpha1": 0.5 * math.pi - 1.2}
+    assert found["equilibrium_deviation_rms"] == pytest.approx(off)
 
 
 def test_latency_is_from_capture_to_the_first_command_on_it(exact_evidence: Evidence) -> None:

@@ -230,6 +230,14 @@ def test_a_robot_that_takes_twist_gets_twist() -> None:
     assert decode_as(command.payload, msg.Twist).linear.x > 0.05
 
 
+def test_feed_forward_takes_the_turn_rate_of_the_estimate() -> None:
+    node = ControllerNode(load_scenario("turtlebot3", ["controller.law=feedforward"]))
+    _, turning, _ = fed([(NOW_NS, estimate(u1=0.4))], node)
+    _, without, _ = fed([(NOW_NS, estimate(u1=0.4))])
+    # Eq. (6) asks for rho * u1 more than (8), at the distance that is predicted.
+    assert turning[0].v2_wanted - without[0].v2_wanted == pytest.approx(0.25 * 0.4, rel=0.2)
+
+
 def test_the_ideal_law_waits_for_the_leaders_turn_rate_and_uses_it() -> None:
     node = ControllerNode(load_scenario("turtlebot3", ["controller.law=ideal"]))
     turning, straight = (

@@ -51,6 +51,7 @@ def program(kind: str, **numbers: object) -> str:
 CASES = [
     ["estimator.kind=ekf", "controller.law=independent", *SMOOTH],
     ["estimator.kind=ekf", "controller.law=ideal", *SLOW],
+    ["estimator.kind=ekf", "controller.law=feedforward", *SLOW],
     ["estimator.kind=ekf", *TORN],
     [
         "estimator.kind=ekf",
