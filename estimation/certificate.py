@@ -20,13 +20,14 @@ from estimation.premises import Premises
 from formation.angles import FloatArray
 from formation.invariant_set import Disturbed, InvariantSet, invariant_set
 from formation.speed_range import SpeedRange
+from formation.station import Side
 from formation.steering_margin import steering_margin
 
 _GRID = 33
 _ROUNDS = 50
 _SETTLED = 1e-6
 
-MANIFOLD = "the reduced system (5), that is alpha2 = pi/2, under law (8), without limits or lag"
+MANIFOLD = "the reduced system (5), that is alpha2 at rest, under law (8), without limits or lag"
 START = "a start inside the set"
 
 
@@ -64,7 +65,7 @@ def certify(given: Premises) -> Certificate:
     """Certificate of a pair and its leader; takes some tenths of a second, the first time."""
     velocity_error = given.velocity_error
     system = Disturbed(given.mu1, given.spacing, given.speeds, given.k_u)
-    held = invariant_set(system)
+    held = None if given.unproved else invariant_set(system)
     rates = _rates(given, velocity_error, held)
     return Certificate(
         velocity_error=velocity_error,
@@ -177,10 +178,14 @@ def _formation(given: Premises, system: Disturbed, held: InvariantSet | None, be
         else f"v1 anywhere between {speeds.lowest:g} and {speeds.highest:g} m/s"
     )
     assumes = (f"|u1| <= k_u = {given.k_u:g} rad/s", drives, besides, MANIFOLD, START)
-    if held is not None:
-        names = ("rho_min", "rho_max", "alpha1_min", "alpha1_max")
-        return Claim({name: getattr(held, name) for name in names}, assumes)
-    return Claim({}, assumes, _why_not_held(given, system))
+    if held is None:
+        return Claim({}, assumes, given.unproved or _why_not_held(given, system))
+    # The left is the right's mirror image, which changes the sign of every bearing.
+    low, high = (held.alpha1_min, held.alpha1_max)
+    if given.side is Side.LEFT:
+        low, high = -high, -low
+    figures = {"rho_min": held.rho_min, "rho_max": held.rho_max, "alpha1_min": low, "alpha1_max": high}
+    return Claim(figures, assumes)
 
 
 def _why_not_held(given: Premises, system: Disturbed) -> str:
@@ -190,12 +195,13 @@ def _why_not_held(given: Premises, system: Disturbed) -> str:
             f"a constant turn of {system.D:.3g} rad/s is not below mu_rho v1 = {reach:.3g} rad/s: "
             "no distance balances it"
         )
-    return f"the worst steering within {system.D:.3g} rad/s carries alpha1 past its saddle at +pi/2"
+    return f"the worst steering within {system.D:.3g} rad/s carries alpha1 past its saddle"
 
 
 def _formation_any_speed(given: Premises, system: Disturbed) -> Claim:
     any_speed = replace(system, speeds=SpeedRange(given.v_eps, given.k_v))
-    return _formation(given, any_speed, invariant_set(any_speed), "exact estimates")
+    held = None if given.unproved else invariant_set(any_speed)
+    return _formation(given, any_speed, held, "exact estimates")
 
 
 def _formation_with_errors(
@@ -219,6 +225,8 @@ def _formation_with_errors(
 def _k_u_star(given: Premises) -> Claim:
     speeds = given.speeds
     assumes = ("exact estimates", MANIFOLD, f"v1 = {speeds.lowest:g} m/s, constant")
+    if given.unproved:
+        return Claim({}, assumes, given.unproved)
     if speeds.lowest != speeds.highest:
         why = (
             "Prop. 3 is about a leader of constant speed; "

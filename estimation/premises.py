@@ -8,6 +8,7 @@ from estimation.guarantees import leader_acceleration
 from estimation.window_estimator import window_estimator
 from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
+from formation.station import Side
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +18,8 @@ class Premises:
     ``eps``: bound of the error of each measured leader position, in any direction [m]. ``step``: time between
     two measurements [s]. Of the leader v_eps <= v1 <= k_v [m/s] and |u1| <= k_u [rad/s]; ``speeds``: the
     speeds that it will really drive, for the formation. Of the law mu1, mu2 [rad/s] and the spacing.
-    ``noise``: in words, where eps comes from.
+    ``noise``: in words, where eps comes from. ``side`` that the follower drives on. ``unproved``: why the
+    theory of the formation does not speak of this pair, empty if it does.
     """
 
     eps: float
@@ -30,6 +32,8 @@ class Premises:
     mu2: float
     spacing: Spacing
     noise: str
+    side: Side = Side.RIGHT
+    unproved: str = ""
 
     @property
     def acceleration(self) -> float:

@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from estimation.premises import Premises
+from formation.shape import ABREAST_ALPHA2
 from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
+from formation.station import Side
 from hil.scenario.schema import Scenario, TableProgram
 
 if TYPE_CHECKING:
@@ -43,7 +45,19 @@ def premises_of(scenario: Scenario, *, driven: bool = True) -> Premises:
         mu2=law.mu2,
         spacing=Spacing(scenario.formation.rho_0, law.mu_rho),
         noise=f"positions within {NOISE_SIGMAS:g} sigma = {1e3 * NOISE_SIGMAS * sigma:.3g} mm ({of_what})",
+        side=Side(scenario.formation.side),
+        unproved=_unproved(scenario),
     )
+
+
+def _unproved(scenario: Scenario) -> str:
+    """Why nothing is known of the formation that this scenario's follower keeps; empty if something is."""
+    law, bearing = scenario.controller, scenario.formation.bearing
+    if bearing != ABREAST_ALPHA2:
+        return f"the set is known abreast only, and formation.bearing is {bearing:g} rad"
+    if law.tilt != 0.0:
+        return f"the set is known without tilt only, and controller.tilt is {law.tilt:g} rad"
+    return ""
 
 
 def _sigma(scenario: Scenario) -> tuple[float, str]:
@@ -77,7 +91,7 @@ _TITLES = {
     "rates": ("rates", "M_rho {M_rho:.4f} m/s, M_alpha2 {M_alpha2:.4f} rad/s"),
     "estimates": ("estimates", "v1 within {M_v1:.4f} m/s"),
     "h": ("error of h", "{sound:.3f} rad/s (by the paper's form {paper:.3f}, which is not a bound)"),
-    "alpha2_ultimate": ("alpha2", "ends within {value:.4f} rad of pi/2"),
+    "alpha2_ultimate": ("alpha2", "ends within {value:.4f} rad of where it is steered"),
     "formation": ("formation", ""),
     "formation_any_speed": ("  at any speed", ""),
     "formation_with_errors": ("  with wrong estimates", ""),

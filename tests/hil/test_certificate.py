@@ -71,3 +71,15 @@ def test_premises_come_from_what_the_lab_knows() -> None:
     assert (recorded.speeds.lowest, recorded.speeds.highest) == (0.04, 0.1)
     standing = load_scenario("turtlebot3", ["leader.program={kind='constant', v=0.0}"])
     assert premises_of(standing).speeds == recorded.speeds
+
+
+def test_the_left_mirrors_the_right_and_other_formations_are_not_certified() -> None:
+    right = certificate_of(load_scenario("turtlebot3")).formation.figures
+    left = certificate_of(load_scenario("turtlebot3", ("formation.side=left",))).formation.figures
+    assert (left["rho_min"], left["rho_max"]) == (right["rho_min"], right["rho_max"])
+    assert (left["alpha1_min"], left["alpha1_max"]) == (-right["alpha1_max"], -right["alpha1_min"])
+    for other in ("formation.bearing=1.2", "controller.tilt=0.5"):
+        certificate = certificate_of(load_scenario("turtlebot3", (other,)))
+        for claim in (certificate.formation, certificate.formation_with_errors, certificate.k_u_star):
+            assert not claim.figures
+            assert other.split("=")[0] in (claim.why or "")
