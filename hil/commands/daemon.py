@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
@@ -10,12 +11,27 @@ import click
 from hil.errors import UsageError
 from hil.live.daemon import Ending, NodeWorker, Worker, run_daemon
 from hil.scenario.files import load_scenario
+from hil.scenario.links import HOSTING, Link, link_of, links_of
 from hil.scenario.schema import Scenario
 from hil.wire.messages import prepare
 from hil.wire.session import Endpoints
-from hil.wire.topics import topics_of
+from hil.wire.topics import types_of, urgent_topics
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """What a daemon is started for.
+
+    ``links``: the followers that an estimator or a controller serves. ``out``: the recorder's log.
+    ``needs``: the daemons that the emulator waits for.
+    """
+
+    scenario: Scenario
+    links: tuple[Link, ...]
+    out: Path | None
+    needs: frozenset[str]
 
 
 def daemon_command(name: str, summary: str) -> click.Command:
@@ -30,6 +46,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         overrides: tuple[str, ...],
         out: Path | None = None,
         needs: str = "estimator,controller",
+        follower: str | None = None,
         tethered: bool = False,
     ) -> None:
         ending = Ending()
@@ -40,15 +57,18 @@ def daemon_command(name: str, summary: str) -> click.Command:
             connect = DEFAULT_ENDPOINT
         chosen = load_scenario(scenario, overrides)
         needed = frozenset(filter(None, needs.split(",")))
+        links = links_of(chosen) if follower is None else (link_of(chosen, follower),)
+        order = Order(chosen, links, out, needed)
         endpoints = Endpoints(connect, listen, zenoh_config)
 
         def say_ready() -> None:
-            click.echo(f"abreast {name}: ready, {chosen.name} on {endpoints.describe()}", err=True)
+            whom = "" if follower is None else f" for {follower}"
+            click.echo(f"abreast {name}: ready{whom}, {chosen.name} on {endpoints.describe()}", err=True)
 
-        prepare(topics_of(chosen).types.values())
+        prepare(types_of(chosen).values())
         dropped = run_daemon(
-            lambda: _WORKERS[name](chosen, out, needed),
-            topics_of(chosen),
+            lambda: _WORKERS[name](order),
+            urgent_topics(chosen),
             endpoints,
             ending,
             duration,
@@ -70,6 +90,9 @@ def daemon_command(name: str, summary: str) -> click.Command:
     ]
     if name == "recorder":
         options.append(click.Option(["--out"], type=path, required=True, help="Log to write (.mcap)."))
+    if name in HOSTING:
+        whom = "The follower of a chain to serve, by its name; without it all."
+        options.append(click.Option(["--follower"], metavar="NAME", help=whom))
     if name == "emulator":
         needs = "Daemons that must be well before the leader sets off, by commas."
         options.append(
@@ -78,33 +101,33 @@ def daemon_command(name: str, summary: str) -> click.Command:
     return click.Command(name, callback=callback, params=options, help=f"Run {summary}.")
 
 
-def _emulator(scenario: Scenario, out: Path | None, needs: frozenset[str]) -> Worker:
+def _emulator(order: Order) -> Worker:
     from hil.emulator.node import EmulatorNode
 
-    return NodeWorker(EmulatorNode(scenario, needs))
+    return NodeWorker([EmulatorNode(order.scenario, order.needs)])
 
 
-def _estimator(scenario: Scenario, out: Path | None, needs: frozenset[str]) -> Worker:
-    from hil.nodes.estimator import EstimatorNode
+def _estimator(order: Order) -> Worker:
+    from hil.nodes.link_nodes import estimator_node
 
-    return NodeWorker(EstimatorNode(scenario))
-
-
-def _controller(scenario: Scenario, out: Path | None, needs: frozenset[str]) -> Worker:
-    from hil.nodes.controller import ControllerNode
-
-    return NodeWorker(ControllerNode(scenario), parting="the controller ended")
+    return NodeWorker([estimator_node(link) for link in order.links])
 
 
-def _recorder(scenario: Scenario, out: Path | None, needs: frozenset[str]) -> Worker:
+def _controller(order: Order) -> Worker:
+    from hil.nodes.link_nodes import controller_node
+
+    return NodeWorker([controller_node(link) for link in order.links], parting="the controller ended")
+
+
+def _recorder(order: Order) -> Worker:
     from hil.live.recorder import Recorder
 
-    if out is None:
+    if order.out is None:
         raise UsageError("abreast recorder: give the log to write with --out")
-    return Recorder(scenario, out)
+    return Recorder(order.scenario, order.out)
 
 
-_WORKERS: dict[str, Callable[[Scenario, Path | None, frozenset[str]], Worker]] = {
+_WORKERS: dict[str, Callable[[Order], Worker]] = {
     "emulator": _emulator,
     "estimator": _estimator,
     "controller": _controller,

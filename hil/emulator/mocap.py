@@ -19,18 +19,20 @@ from formation.pose import Motion, Pose
 _FULL_NOISE_SPEED = 0.05
 _FULL_NOISE_TURN = 0.2
 _NS = 1e-9
+_KEPT_BLOCKS = 64  # one of every stream of a long chain, so that none is drawn again and again
 
 
 class Stream(IntEnum):
-    """Independent streams of random numbers of one run."""
+    """Independent streams of random numbers of one run. Further agents of a chain have those that follow."""
 
     MOCAP = 0
     LEADER_ODOMETRY = 1
     FOLLOWER_ODOMETRY = 2
 
 
-BLOCK = {Stream.MOCAP: 4096, Stream.LEADER_ODOMETRY: 1024, Stream.FOLLOWER_ODOMETRY: 1024}
-"""Items of a stream drawn at once: about what half a minute has, as a generator is slow to set up."""
+def block_length(stream: int) -> int:
+    """Items of a stream drawn at once: about what half a minute has, as a generator is slow to set up."""
+    return 4096 if stream == Stream.MOCAP else 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,36 +77,36 @@ class CaptureClock:
 class Draw:
     """Random numbers of one frame: three standard normals per body, delay [s], and whether it is lost."""
 
-    leader: tuple[float, ...]
-    follower: tuple[float, ...]
+    bodies: tuple[tuple[float, ...], ...]
     delay: float
     lost: bool
 
 
-def normals(seed: int, stream: Stream, index: int, count: int) -> tuple[float, ...]:
+def normals(seed: int, stream: int, index: int, count: int) -> tuple[float, ...]:
     """``count`` standard normals for the ``index``-th item of a stream."""
-    block, row = divmod(index, BLOCK[stream])
+    block, row = divmod(index, block_length(stream))
     return tuple(_kept(seed, stream, block, count)[0][row].tolist())
 
 
-def draw_frame(seed: int, index: int, delivery: Delivery) -> Draw:
+def draw_frame(seed: int, index: int, delivery: Delivery, bodies: int = 2) -> Draw:
     """Random numbers of a mocap frame."""
-    block, row = divmod(index, BLOCK[Stream.MOCAP])
-    rows, shares = _kept(seed, Stream.MOCAP, block, 6)
+    block, row = divmod(index, block_length(Stream.MOCAP))
+    rows, shares = _kept(seed, Stream.MOCAP, block, 3 * bodies)
     normal, (late, lost) = tuple(rows[row].tolist()), shares[row].tolist()
     delay = delivery.latency - delivery.jitter * math.log1p(-late)
-    return Draw(normal[:3], normal[3:], delay, lost < delivery.loss)
+    each = tuple(normal[first : first + 3] for first in range(0, 3 * bodies, 3))
+    return Draw(each, delay, lost < delivery.loss)
 
 
-def draw_block(seed: int, stream: Stream, block: int, count: int) -> tuple[FloatArray, FloatArray]:
-    """Normals (n, count) of the n = ``BLOCK[stream]`` items of a block, and for frames uniforms (n, 2)."""
+def draw_block(seed: int, stream: int, block: int, count: int) -> tuple[FloatArray, FloatArray]:
+    """Normals (n, count) of the n = :func:`block_length` items of a block, and for frames uniforms (n, 2)."""
     random = np.random.Generator(np.random.Philox(key=[seed, int(stream)], counter=[0, 0, 0, block]))
-    n = BLOCK[stream]
+    n = block_length(stream)
     normal = random.standard_normal((n, count))
-    return normal, random.random((n if stream is Stream.MOCAP else 0, 2))
+    return normal, random.random((n if stream == Stream.MOCAP else 0, 2))
 
 
-_kept = functools.lru_cache(maxsize=16)(draw_block)
+_kept = functools.lru_cache(maxsize=_KEPT_BLOCKS)(draw_block)
 
 
 def observe(pose: Pose, motion: Motion, noise: MocapNoise, normal: tuple[float, ...]) -> Pose:

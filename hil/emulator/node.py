@@ -1,18 +1,20 @@
-"""The emulator daemon: two robots and a motion capture that stand in for the lab.
+"""The emulator daemon: the robots of a pair or a chain, and a motion capture that stand in for the lab.
 
-The leader stands until the whole chain is alive (start barrier): estimator, controller and, where the run has
-one, recorder have reported that they are well, and a command has reached the follower.
+The leader stands until everything behind it is alive (start barrier): estimators, controllers and, where the
+run has one, recorder have reported that they are well, and a command has reached every follower.
 """
 
 from __future__ import annotations
 
 from bisect import insort
 from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
 
 from msgspec import Struct, field
 from msgspec.structs import replace
 
-from formation.pose import STANDSTILL, Motion
+from formation.pose import STANDSTILL, Motion, Pose
 from hil.emulator.faults import Pair, faulty
 from hil.emulator.lab_messages import frame_message, odometry_message, truth_message
 from hil.emulator.mocap import (
@@ -27,13 +29,15 @@ from hil.emulator.mocap import (
 )
 from hil.emulator.robot import Actuators, Robot, drive
 from hil.nodes.node import Counts, Event, Outgoing, counted, diagnostics, named_counts, no_counts, outgoing
-from hil.scenario.parts import leader_program, start_poses
+from hil.scenario.links import links_of, node_names
+from hil.scenario.parts import leader_program
 from hil.scenario.schema import Scenario
+from hil.scenario.start import chain_poses
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.drive_message import drive_message, read_drive
 from hil.wire.messages import MalformedPayloadError, decode_as
-from hil.wire.topics import topics_of
+from hil.wire.topics import link_topics
 
 NAME = "emulator"
 _NS = 1e-9
@@ -41,32 +45,35 @@ _DIAGNOSTICS_NS = 500_000_000
 
 
 class EmulatorState(Struct, frozen=True):
-    """The world: both robots at ``time_ns``, what is on its way, and what is due next.
+    """The world: all robots at ``time_ns``, the leader first, what is on its way, and what is due next.
 
-    ``alive``: daemons that have reported to be well. ``motion_since_ns``: when the leader set off, None
-    before. ``pending``: captured frames, and odometry that is told later, by release time. ``shown``: what
-    the newest frame shows.
+    ``alive``: nodes that have reported to be well. ``commanded``: followers that have had a command, by
+    their place. ``motion_since_ns``: when the leader set off, None before. ``pending``: captured frames, and
+    odometry that is told later, by release time. ``shown``: what the newest frame shows of every robot.
     """
 
     time_ns: int
     begun_ns: int
-    leader: Robot
-    follower: Robot
+    robots: tuple[Robot, ...]
     frames: int = 0
     odometry: int = 0
     lost: int = 0
     pending: tuple[tuple[int, int, Outgoing], ...] = ()
     alive: frozenset[str] = frozenset()
-    commanded: bool = False
+    commanded: frozenset[int] = frozenset()
     stopped: bool = False
     motion_since_ns: int | None = None
     refused: Counts = field(default_factory=no_counts)
     next_diagnostics_ns: int = 0
-    shown: Pair | None = None
+    shown: tuple[Pose, ...] = ()
 
 
 class EmulatorNode:
-    """Pure step of the emulator daemon. ``needs``: names of the daemons that the start barrier waits for."""
+    """Pure step of the emulator daemon.
+
+    ``needs``: the daemons that the start barrier waits for; where these host a node for each follower of a
+    chain, all of them.
+    """
 
     name = NAME
 
@@ -75,10 +82,13 @@ class EmulatorNode:
     ) -> None:
         robot, mocap = scenario.robot, scenario.mocap
         self.scenario = scenario
-        self.needs = needs
-        self.topics = topics_of(scenario)
+        links = links_of(scenario)
+        self.needs = frozenset(name for need in needs for name in node_names(need, links))
+        self.pairs = [link_topics(link) for link in links]
+        self.topics = self.pairs[0]
+        self.names = (self.topics.leader, *(pair.follower for pair in self.pairs))
         self.program = leader_program(scenario)
-        self.poses = start_poses(scenario)
+        self.poses = chain_poses(scenario, len(self.names))
         self.actuators = Actuators(
             robot.lag_s, robot.v_max, robot.u_max, robot.v_resolution, robot.u_resolution
         )
@@ -88,16 +98,15 @@ class EmulatorNode:
             mocap.clock_offset_s, mocap.clock_drift_ppm * 1e-6, mocap.clock_jump_s, mocap.clock_jump_at_s
         )
         self._handlers: dict[str, Callable[[EmulatorState, bytes, int], EmulatorState]] = {
-            self.topics.cmd_vel: self._on_command,
+            **{pair.cmd_vel: partial(self._on_command, k) for k, pair in enumerate(self.pairs, start=1)},
             topics.STOP: self._on_stop,
             topics.DIAGNOSTICS: self._on_diagnostics,
         }
         self.subscribes = tuple(self._handlers)
 
     def begin(self, now_ns: int) -> EmulatorState:
-        """Both robots stand at their start poses."""
-        leader, follower = self.poses
-        return EmulatorState(now_ns, now_ns, Robot(leader), Robot(follower), next_diagnostics_ns=now_ns)
+        """All robots stand at their start poses."""
+        return EmulatorState(now_ns, now_ns, tuple(map(Robot, self.poses)), next_diagnostics_ns=now_ns)
 
     def due_ns(self, state: EmulatorState) -> int:
         """Time of the next capture, odometry sample, or release of a captured frame."""
@@ -121,20 +130,17 @@ class EmulatorNode:
         except MalformedPayloadError:
             return replace(state, refused=counted(state.refused, "malformed")), out
 
-    def _on_command(self, state: EmulatorState, payload: bytes, now_ns: int) -> EmulatorState:
+    def _on_command(self, place: int, state: EmulatorState, payload: bytes, now_ns: int) -> EmulatorState:
         wanted = STANDSTILL if state.stopped else read_drive(payload, stamped=self.topics.stamped)
         state = self._move(state, now_ns)
-        follower = state.follower.told(self.actuators.accept(wanted))
-        return replace(state, follower=follower, commanded=True)
+        return replace(
+            _with_command(state, place, self.actuators.accept(wanted)), commanded=state.commanded | {place}
+        )
 
     def _on_stop(self, state: EmulatorState, payload: bytes, now_ns: int) -> EmulatorState:
         state = self._move(state, now_ns)
-        return replace(
-            state,
-            stopped=True,
-            leader=state.leader.told(STANDSTILL),
-            follower=state.follower.told(STANDSTILL),
-        )
+        robots = tuple(robot.told(STANDSTILL) for robot in state.robots)
+        return replace(state, stopped=True, robots=robots)
 
     def _on_diagnostics(self, state: EmulatorState, payload: bytes, now_ns: int) -> EmulatorState:
         report = decode_as(payload, msg.DiagnosticArray)
@@ -158,23 +164,22 @@ class EmulatorNode:
         dt = (until_ns - state.time_ns) * _NS
         if dt <= 0.0:
             return state
-        leader = drive(state.leader, self.actuators, dt)
-        follower = drive(state.follower, self.actuators, dt)
-        return replace(state, time_ns=until_ns, leader=leader, follower=follower)
+        robots = tuple(drive(robot, self.actuators, dt) for robot in state.robots)
+        return replace(state, time_ns=until_ns, robots=robots)
 
     def _capture(self, state: EmulatorState, out: list[Outgoing]) -> EmulatorState:
         """Take a mocap frame, publish the truth, and let the leader's program go on."""
         at_ns, number = state.time_ns, state.frames
         state = self._lead(state, at_ns)
-        leader, follower = state.leader, state.follower
-        out.append(outgoing(topics.TRUTH, truth_message(at_ns, number, leader, follower), at_ns))
-        draw = draw_frame(self.scenario.run.seed, number, self.delivery)
+        for pair, (leader, follower) in zip(self.pairs, pairwise(state.robots), strict=True):
+            out.append(outgoing(pair.truth, truth_message(at_ns, number, leader, follower), at_ns))
+        draw = draw_frame(self.scenario.run.seed, number, self.delivery, len(state.robots))
         state = replace(state, frames=number + 1)
-        shown = None if draw.lost else self._shown(state, draw)
-        if shown is None:
+        shown = () if draw.lost else self._shown(state, draw)
+        if not shown:
             state = replace(state, lost=state.lost + 1)
         else:
-            bodies = ((self.topics.leader, shown.leader), (self.topics.follower, shown.follower))
+            bodies = zip(self.names, shown, strict=True)
             stamp_ns = self.clock.stamp_ns(at_ns, state.begun_ns, state.motion_since_ns)
             frame = outgoing(topics.RIGID_BODIES, frame_message(stamp_ns, number, bodies), at_ns)
             state = replace(state, shown=shown)
@@ -184,17 +189,19 @@ class EmulatorNode:
             state = replace(state, next_diagnostics_ns=at_ns + _DIAGNOSTICS_NS)
         return state
 
-    def _shown(self, state: EmulatorState, draw: Draw) -> Pair | None:
-        """Both bodies as the motion capture shows them now, faults included; None for no frame at all."""
-        leader, follower, mocap = state.leader, state.follower, self.scenario.mocap
-        pair = Pair(
-            observe(leader.pose, leader.motion, self.noise, draw.leader),
-            observe(follower.pose, follower.motion, self.noise, draw.follower),
+    def _shown(self, state: EmulatorState, draw: Draw) -> tuple[Pose, ...]:
+        """All bodies as the motion capture shows them now, faults included; empty for no frame at all."""
+        mocap = self.scenario.mocap
+        poses = tuple(
+            observe(robot.pose, robot.motion, self.noise, normal)
+            for robot, normal in zip(state.robots, draw.bodies, strict=True)
         )
         if not mocap.faults or state.motion_since_ns is None:
-            return pair
+            return poses
         t = (state.time_ns - state.motion_since_ns) * _NS
-        return faulty(mocap.faults, t, 1.0 / mocap.rate_hz, pair, state.shown)
+        last = Pair(*state.shown[:2]) if state.shown else None
+        pair = faulty(mocap.faults, t, 1.0 / mocap.rate_hz, Pair(*poses[:2]), last)
+        return () if pair is None else (pair.leader, pair.follower, *poses[2:])
 
     def _lead(self, state: EmulatorState, at_ns: int) -> EmulatorState:
         """Give the leader its next command; it sets off once all are alive."""
@@ -202,18 +209,17 @@ class EmulatorNode:
             return state
         since_ns = state.motion_since_ns
         if since_ns is None:
-            if not (state.commanded and state.alive >= self.needs):
+            if len(state.commanded) < len(self.pairs) or not state.alive >= self.needs:
                 return state
             since_ns = at_ns
             state = replace(state, motion_since_ns=at_ns, next_diagnostics_ns=at_ns)
         command = self.actuators.accept(self.program((at_ns - since_ns) * _NS))
-        return replace(state, leader=state.leader.told(command))
+        return _with_command(state, 0, command)
 
     def _sample_odometry(self, state: EmulatorState, out: list[Outgoing]) -> EmulatorState:
         number, at_ns, robot = state.odometry, state.time_ns, self.scenario.robot
-        for name, stream, body in (
-            (self.topics.leader, Stream.LEADER_ODOMETRY, state.leader),
-            (self.topics.follower, Stream.FOLLOWER_ODOMETRY, state.follower),
+        for stream, (name, body) in enumerate(
+            zip(self.names, state.robots, strict=True), start=Stream.LEADER_ODOMETRY
         ):
             normal = normals(self.scenario.run.seed, stream, number, 2)
             moving = 0.0 if body.motion == STANDSTILL else 1.0
@@ -228,7 +234,7 @@ class EmulatorNode:
             else:
                 state = _with_pending(state, told_ns, number, message)
         leader_drives = drive_message(
-            state.leader.command, at_ns, self.topics.leader, stamped=self.topics.stamped
+            state.robots[0].command, at_ns, self.topics.leader, stamped=self.topics.stamped
         )
         out.append(outgoing(self.topics.leader_cmd_vel, leader_drives, at_ns))
         return replace(state, odometry=number + 1)
@@ -244,12 +250,23 @@ class EmulatorNode:
         missing = sorted(self.needs - state.alive)
         if not state.commanded:
             missing.append("a command")
+        elif len(state.commanded) < len(self.pairs):
+            missing += [
+                f"a command to {pair.follower}"
+                for place, pair in enumerate(self.pairs, start=1)
+                if place not in state.commanded
+            ]
         problem = f"waiting for {', '.join(missing)}" if missing else ""
         values: dict[str, object] = {"stopped": state.stopped, "frames": state.frames, "lost": state.lost}
         if state.motion_since_ns is not None:
             values["motion_since_ns"] = state.motion_since_ns
         values |= named_counts("refused", state.refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
+
+
+def _with_command(state: EmulatorState, place: int, command: Motion) -> EmulatorState:
+    robots = state.robots
+    return replace(state, robots=(*robots[:place], robots[place].told(command), *robots[place + 1 :]))
 
 
 def _with_pending(state: EmulatorState, release_ns: int, number: int, message: Outgoing) -> EmulatorState:

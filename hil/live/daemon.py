@@ -1,4 +1,4 @@
-"""A node, live: the wire and the clock on one side, the pure step on the other."""
+"""Nodes, live: the wire and the clock on one side, the pure steps on the other."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from types import FrameType
 from typing import Any, Protocol
 
@@ -16,7 +16,6 @@ from hil.wire import topics
 from hil.wire.message_types import String
 from hil.wire.pubsub import Wire
 from hil.wire.session import Endpoints, close_session, open_session
-from hil.wire.topics import Topics
 
 _LONGEST_WAIT = 0.1
 _LINGER = 0.05
@@ -41,38 +40,46 @@ class Worker(Protocol):
 
 
 class NodeWorker:
-    """Carries a node's state from step to step.
+    """Carries the states of nodes from step to step: one node, or one for each follower of a chain.
 
-    With ``parting`` the node is told to stop before it leaves, by the same stop message that all others get:
-    so a controller's last command is a standstill, and the log holds the reason.
+    With ``parting`` the nodes are told to stop before they leave, by the same stop message that all others
+    get: so a controller's last command is a standstill, and the log holds the reason.
     """
 
-    def __init__(self, node: Node[Any], parting: str = "") -> None:
-        self.node = node
-        self.subscribes = node.subscribes
+    def __init__(self, nodes: Sequence[Node[Any]], parting: str = "") -> None:
+        self.nodes = tuple(nodes)
+        self.subscribes = tuple(dict.fromkeys(topic for node in nodes for topic in node.subscribes))
         self._parting = parting
-        self._state: Any = None
+        self._states: list[Any] = []
 
     def begin(self, now_ns: int) -> None:
-        """Let the node come up."""
-        self._state = self.node.begin(now_ns)
+        """Let the nodes come up."""
+        self._states = [node.begin(now_ns) for node in self.nodes]
 
     def due_ns(self) -> int:
-        """Time of the node's next tick."""
-        return self.node.due_ns(self._state)
+        """Time of the next tick of any node."""
+        return min(self._dues())
 
     def take(self, event: Event, now_ns: int) -> tuple[Outgoing, ...]:
-        """One step."""
-        self._state, out = self.node.step(self._state, event, now_ns)
-        return out
+        """One step of every node that listens to an arrival or, at a tick, is due."""
+        out: list[Outgoing] = []
+        for place, (node, due_ns) in enumerate(zip(self.nodes, self._dues(), strict=True)):
+            if event.topic in node.subscribes if event.topic else due_ns <= now_ns:
+                self._states[place], sent = node.step(self._states[place], event, now_ns)
+                out.extend(sent)
+        return tuple(out)
 
     def end(self, now_ns: int) -> tuple[Outgoing, ...]:
-        """The parting stop, if any, and the node's final report."""
+        """The parting stop, if any, and the nodes' final reports."""
         out: tuple[Outgoing, ...] = ()
         if self._parting:
             stop = outgoing(topics.STOP, String(data=self._parting), now_ns)
             out = (stop, *self.take(Event(stop.topic, stop.payload), now_ns))
-        return (*out, self.node.report(self._state, now_ns))
+        reports = (node.report(state, now_ns) for node, state in zip(self.nodes, self._states, strict=True))
+        return (*out, *reports)
+
+    def _dues(self) -> list[int]:
+        return [node.due_ns(state) for node, state in zip(self.nodes, self._states, strict=True)]
 
 
 class Ending:
@@ -114,7 +121,7 @@ class Ending:
 
 def run_daemon(
     make_worker: Callable[[], Worker],
-    names: Topics,
+    urgent: Iterable[str],
     endpoints: Endpoints,
     ending: Ending,
     duration_s: float | None = None,
@@ -123,11 +130,11 @@ def run_daemon(
     """Run a worker on the wire until the end is asked for or ``duration_s`` is over.
 
     The worker is made once the wire is there; ``on_ready`` is called when it is subscribed. Events are taken
-    one at a time in order of arrival; ``now`` is the host clock when one is taken. Returns how many arrivals
-    found the inbox full and were dropped.
+    one at a time in order of arrival; ``now`` is the host clock when one is taken. ``urgent``: topics that
+    go ahead of all others. Returns how many arrivals found the inbox full and were dropped.
     """
     session = open_session(endpoints, give_up=lambda: ending.asked)
-    wire = Wire(session, urgent=(names.cmd_vel, topics.STOP))
+    wire = Wire(session, urgent)
     try:
         ending.notify(wire.wake)
         worker = make_worker()

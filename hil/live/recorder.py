@@ -14,7 +14,6 @@ from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.message_types import Malformed
 from hil.wire.messages import MalformedPayloadError, decode, encode, header, typename_of
-from hil.wire.topics import topics_of
 
 NAME = "recorder"
 _FLUSH_NS = 100_000_000
@@ -30,7 +29,7 @@ class Recorder:
     """
 
     def __init__(self, scenario: Scenario, path: Path) -> None:
-        self._types = topics_of(scenario).types
+        self._types = topics.types_of(scenario)
         self.subscribes = tuple(topic for topic in self._types if topic != topics.MALFORMED)
         self._log = LogWriter(path, log_metadata(scenario, "live"))
         self._counts = no_counts()

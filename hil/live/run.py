@@ -1,4 +1,7 @@
-"""A live run: a router, four daemons as processes, and a supervisor that stops the robots if one fails."""
+"""A live run: a router, four daemons as processes, and a supervisor that stops the robots if one fails.
+
+There are no more processes for a chain: its estimators share one, and its controllers another.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ from hil.live.child_processes import Children
 from hil.live.daemon import Ending
 from hil.live.watch import Picture, Watch
 from hil.scenario.files import scenario_text
+from hil.scenario.links import links_of, node_names
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -19,7 +23,7 @@ from hil.wire.drive_message import drive_message
 from hil.wire.messages import encode
 from hil.wire.pubsub import Wire
 from hil.wire.session import Endpoints, close_session, open_session
-from hil.wire.topics import topics_of
+from hil.wire.topics import link_topics, urgent_topics
 
 DAEMONS = ("recorder", "estimator", "controller", "emulator")
 START_TIMEOUT = 30.0
@@ -60,10 +64,12 @@ def run_live(
 class _Supervisor:
     def __init__(self, scenario: Scenario, folder: Path, log_path: Path, endpoint: str) -> None:
         self._scenario = scenario
-        self._names = topics_of(scenario)
+        links = links_of(scenario)
+        self._pairs = [link_topics(link) for link in links]
+        self._nodes = [name for daemon in DAEMONS for name in node_names(daemon, links)]
         self._session = open_session(Endpoints(connect=endpoint))
-        self._wire = Wire(self._session, urgent=(self._names.cmd_vel, topics.STOP))
-        self._watch = Watch(self._session, self._names)
+        self._wire = Wire(self._session, urgent_topics(scenario))
+        self._watch = Watch(self._session, self._pairs)
         self._children = Children(folder)
         resolved = folder / "scenario.toml"
         resolved.write_text(scenario_text(scenario), encoding="utf-8")
@@ -86,7 +92,9 @@ class _Supervisor:
             if set_off is None and picture.motion_since_ns is not None:
                 set_off = now - (time.time_ns() - picture.motion_since_ns) * 1e-9
             if set_off is None and now - begun > START_TIMEOUT:
-                failure = f"the start barrier did not open within {START_TIMEOUT:g} s: {_waiting(picture)}"
+                failure = (
+                    f"the start barrier did not open within {START_TIMEOUT:g} s: {self._waiting(picture)}"
+                )
             show(picture, None if set_off is None else now - set_off)
             if set_off is not None and now - set_off >= duration:
                 break
@@ -112,26 +120,24 @@ class _Supervisor:
             code = ended.process.wait()
             how = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
             return f"the {ended.name} {how}" + (f": {words}" if code > 0 and words else "")
-        silent = self._watch.picture.silent(DAEMONS, SILENCE)
+        silent = self._watch.picture.silent(self._nodes, SILENCE)
         return f"the {silent} has said nothing for {SILENCE:g} s" if silent else ""
 
     def _stop(self, reason: str) -> None:
         """Stop everybody, speak for a controller that may be gone, and wait until the robots stand."""
         self._wire.publish(topics.STOP, encode(msg.String(data=reason)))
-        self._wire.publish(self._names.cmd_vel, encode(self._standstill()))
+        for pair in self._pairs:
+            still = drive_message(STANDSTILL, time.time_ns(), pair.follower, stamped=pair.stamped)
+            self._wire.publish(pair.cmd_vel, encode(still))
         deadline = time.monotonic() + STANDSTILL_TIMEOUT
         while time.monotonic() < deadline and not self._watch.look().standing:
             time.sleep(_GLANCE)
         time.sleep(_GLANCE)
 
-    def _standstill(self) -> msg.Message:
-        return drive_message(STANDSTILL, time.time_ns(), self._names.follower, stamped=self._names.stamped)
-
-
-def _waiting(picture: Picture) -> str:
-    """What the start barrier waits for, in words."""
-    unheard = [name for name in DAEMONS if name not in picture.heard]
-    if unheard:
-        return f"nothing was heard of {', '.join(unheard)}"
-    problems = [f"{name}: {problem}" for name, problem in picture.problems.items() if problem]
-    return "; ".join(problems) or "no daemon says why"
+    def _waiting(self, picture: Picture) -> str:
+        """What the start barrier waits for, in words."""
+        unheard = [name for name in self._nodes if name not in picture.heard]
+        if unheard:
+            return f"nothing was heard of {', '.join(unheard)}"
+        problems = [f"{name}: {problem}" for name, problem in picture.problems.items() if problem]
+        return "; ".join(problems) or "no daemon says why"

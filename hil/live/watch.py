@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import zenoh
@@ -21,71 +22,88 @@ _STILL_U = 0.05
 
 @dataclass(slots=True)
 class Picture:
-    """The newest of everything. ``heard``: when each daemon last reported (monotonic seconds)."""
+    """The newest of everything, by the follower that it is of.
+
+    ``followers``: their names from the leader on. ``heard``: when each node last reported (monotonic
+    seconds), ``problems``: what it said.
+    """
+
+    followers: tuple[str, ...] = ()
 
     heard: dict[str, float] = field(default_factory=dict)
     problems: dict[str, str] = field(default_factory=dict)
     motion_since_ns: int | None = None
-    estimate: msg.LeaderEstimate | None = None
-    command: msg.Command | None = None
-    truth: msg.Truth | None = None
+    estimates: dict[str, msg.LeaderEstimate] = field(default_factory=dict)
+    commands: dict[str, msg.Command] = field(default_factory=dict)
+    truths: dict[str, msg.Truth] = field(default_factory=dict)
 
     @property
     def standing(self) -> bool:
-        """Whether both robots stand, as far as wheel encoders can tell."""
-        truth = self.truth
-        return truth is not None and (
+        """Whether all robots stand, as far as wheel encoders can tell."""
+        truths = self.truths.values()
+        return len(truths) == len(self.followers) and all(
             max(abs(truth.v1), abs(truth.v2)) < _STILL_V and max(abs(truth.u1), abs(truth.u2)) < _STILL_U
+            for truth in truths
         )
 
     def silent(self, names: Iterable[str], patience: float) -> str | None:
-        """A daemon that has reported before but not in the last ``patience`` [s]."""
+        """A node that has reported before but not in the last ``patience`` [s]."""
         now = time.monotonic()
         return next((n for n in names if n in self.heard and now - self.heard[n] > patience), None)
 
     def line(self, elapsed: float, duration: float) -> str:
         """One line for the person who watches."""
         parts = [f"{elapsed:5.1f} / {duration:g} s"]
-        if self.estimate is not None:
-            seen = self.estimate
-            parts.append(f"{Status(seen.status).name.lower():12s}")
-            parts.append(f"rho {seen.rho:.3f} m  v1 {seen.v1 * 1e3:4.0f} mm/s  alpha1 {seen.alpha1:+.2f} rad")
-        if self.command is not None:
-            sent = self.command
-            parts.append(sent.stop or f"v2 {sent.v2:+.3f} m/s  u2 {sent.u2:+.2f} rad/s")
+        parts += self._of_chain() if len(self.followers) > 1 else self._of_pair()
         return "  ".join(parts)
+
+    def _of_pair(self) -> Iterator[str]:
+        for seen in self.estimates.values():
+            yield f"{Status(seen.status).name.lower():12s}"
+            yield f"rho {seen.rho:.3f} m  v1 {seen.v1 * 1e3:4.0f} mm/s  alpha1 {seen.alpha1:+.2f} rad"
+        for sent in self.commands.values():
+            yield sent.stop or f"v2 {sent.v2:+.3f} m/s  u2 {sent.u2:+.2f} rad/s"
+
+    def _of_chain(self) -> Iterator[str]:
+        seen = [self.estimates[name] for name in self.followers if name in self.estimates]
+        tracking = sum(each.status == Status.TRACKING for each in seen)
+        yield f"{tracking} of {len(self.followers)} tracking"
+        yield f"rho {' '.join(f'{each.rho:.3f}' for each in seen)} m"
+        sent = [self.commands[name] for name in self.followers if name in self.commands]
+        yield f"v2 {' '.join(each.stop or f'{each.v2:+.3f}' for each in sent)} m/s"
 
 
 class Watch:
     """Keeps a :class:`Picture` up to date from a session's subscriptions."""
 
-    def __init__(self, session: zenoh.Session, names: Topics) -> None:
-        self.picture = Picture()
+    def __init__(self, session: zenoh.Session, pairs: Sequence[Topics]) -> None:
+        self.picture = Picture(tuple(pair.follower for pair in pairs))
         self._lock = threading.Lock()
         self._latest: dict[str, bytes] = {}
         self._subscribers = [
             session.declare_subscriber(topics.DIAGNOSTICS, self._on_diagnostics),
             *(
                 session.declare_subscriber(topic, self._keep)
-                for topic in (names.estimate, names.command, topics.TRUTH)
+                for pair in pairs
+                for topic in (pair.estimate, pair.command, pair.truth)
             ),
         ]
-        self._names = names
+        self._pairs = pairs
 
     def look(self) -> Picture:
         """The picture as of now. Payloads are decoded here, not in Zenoh's threads."""
         with self._lock:
             latest, self._latest = self._latest, {}
         picture = self.picture
-        try:
-            if self._names.estimate in latest:
-                picture.estimate = decode_as(latest[self._names.estimate], msg.LeaderEstimate)
-            if self._names.command in latest:
-                picture.command = decode_as(latest[self._names.command], msg.Command)
-            if topics.TRUTH in latest:
-                picture.truth = decode_as(latest[topics.TRUTH], msg.Truth)
-        except (MalformedPayloadError, ValueError):
-            pass  # somebody else's noise; those who act on these topics count it
+        for pair in self._pairs:
+            # What can't be decoded is somebody else's noise; those who act on these topics count it.
+            with contextlib.suppress(MalformedPayloadError, ValueError):
+                if pair.estimate in latest:
+                    picture.estimates[pair.follower] = decode_as(latest[pair.estimate], msg.LeaderEstimate)
+                if pair.command in latest:
+                    picture.commands[pair.follower] = decode_as(latest[pair.command], msg.Command)
+                if pair.truth in latest:
+                    picture.truths[pair.follower] = decode_as(latest[pair.truth], msg.Truth)
         return picture
 
     def close(self) -> None:

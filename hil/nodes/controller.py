@@ -66,12 +66,11 @@ class ControllerState(Struct, frozen=True):
 
 
 class ControllerNode:
-    """Pure step of the controller daemon."""
+    """Pure step of the controller of one follower."""
 
-    name = NAME
-
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, name: str = NAME) -> None:
         given = scenario.controller
+        self.name = name
         self.topics = topics_of(scenario)
         self.law = LAWS[given.law]
         self.gains, self.limits = gains(scenario), limits(scenario)

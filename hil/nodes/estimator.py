@@ -112,13 +112,16 @@ class EstimatorState(Struct, frozen=True):
 
 
 class EstimatorNode:
-    """Pure step of the estimator daemon. Raises :class:`UsageError` for an estimator that is not live."""
+    """Pure step of the estimator of one follower. Raises :class:`UsageError` for one that is not live.
 
-    name = NAME
+    ``others``: names of further robots that the motion capture shows.
+    """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, name: str = NAME, others: frozenset[str] = frozenset()) -> None:
         refuse_unrunnable(scenario)
         given = scenario.estimator
+        self.name = name
+        self.others = others
         self.scenario = scenario
         self.topics = topics_of(scenario)
         self.front_end = FrontEnd(given.front_end)
@@ -190,7 +193,7 @@ class EstimatorNode:
         return estimate_at(state.track[-1], self.tracker.status(state.track, now_ns))
 
     def _on_frame(self, state: EstimatorState, payload: bytes, now_ns: int) -> EstimatorState:
-        frame = read_frame(payload, self.topics.leader, self.topics.follower)
+        frame = read_frame(payload, self.topics.leader, self.topics.follower, others=self.others)
         timed = self.frame_time.of(state.times, frame, now_ns)
         state = replace(state, times=timed.times)
         if timed.refusal:

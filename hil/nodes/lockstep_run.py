@@ -1,4 +1,4 @@
-"""A whole run in lockstep: emulator, estimator and controller on a simulated clock, into a log."""
+"""A whole run in lockstep: emulator, estimators and controllers on a simulated clock, into a log."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from hil.emulator.node import EmulatorNode, EmulatorState
 from hil.errors import CheckFailedError
 from hil.log.metadata import certificate_metadata, log_metadata
 from hil.log.writer import LogWriter
-from hil.nodes.controller import ControllerNode
-from hil.nodes.estimator import EstimatorNode
+from hil.nodes.link_nodes import controller_node, estimator_node
 from hil.nodes.lockstep import EPOCH_NS, Lockstep
 from hil.nodes.node import Node, Outgoing, outgoing
+from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.message_types import String
@@ -27,8 +27,9 @@ STOPPING_NS = 600_000_000
 
 def make_nodes(scenario: Scenario) -> list[Node[Any]]:
     """The nodes of a run; making them loads and compiles all that they need."""
-    prepare(topics.topics_of(scenario).types.values())
-    return [EmulatorNode(scenario), EstimatorNode(scenario), ControllerNode(scenario)]
+    prepare(topics.types_of(scenario).values())
+    links = links_of(scenario)
+    return [EmulatorNode(scenario), *map(estimator_node, links), *map(controller_node, links)]
 
 
 def run_lockstep(scenario: Scenario, log_path: Path, nodes: list[Node[Any]] | None = None) -> None:
@@ -61,5 +62,5 @@ def _wait_for_motion(lockstep: Lockstep) -> int:
             return state.motion_since_ns
     raise CheckFailedError(
         f"the start barrier did not open within {START_TIMEOUT_NS * 1e-9:g} s of simulated time; "
-        "the follower gets no frames or no odometry: check mocap.loss, mocap.latency_s and the rates"
+        "a follower gets no frames or no odometry: check mocap.loss, mocap.latency_s and the rates"
     )

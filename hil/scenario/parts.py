@@ -13,12 +13,13 @@ from controllers.side_change_run import run_with_changes
 from formation.angles import FloatArray
 from formation.closed_loop import FollowerLaw, Trajectory, simulate_pair
 from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
-from formation.pose import Motion, Pose
-from formation.shape import Shape, shape_of
+from formation.pose import Motion
+from formation.shape import Shape
 from formation.spacing import Spacing
 from formation.station import Side, Station
 from hil.errors import UsageError
 from hil.scenario.schema import ConstantProgram, ImpulseProgram, Scenario, SinusoidProgram
+from hil.scenario.start import start_poses, start_shape
 
 
 def leader_program(scenario: Scenario) -> LeaderProgram:
@@ -51,22 +52,6 @@ def station(scenario: Scenario) -> Station:
 def limits(scenario: Scenario) -> Limits:
     """Limits that the controller keeps to."""
     return Limits(scenario.controller.v_max, scenario.controller.u_max)
-
-
-def start_poses(scenario: Scenario) -> tuple[Pose, Pose]:
-    """Start poses of leader and follower in the world frame."""
-    leader, follower = Pose(*scenario.leader.pose), Pose(*scenario.follower.pose)
-    if (leader.x, leader.y) == (follower.x, follower.y):
-        raise UsageError(
-            f"scenario {scenario.name}: leader.pose and follower.pose are both at ({leader.x}, {leader.y}); "
-            "set them apart"
-        )
-    return leader, follower
-
-
-def start_shape(scenario: Scenario) -> Shape:
-    """Shape of the pair at the start."""
-    return shape_of(*start_poses(scenario))
 
 
 def follower_law(scenario: Scenario) -> FollowerLaw:

@@ -245,9 +245,15 @@ class ChainSection(_Section, frozen=True, kw_only=True):
 
     The leader is the first agent and the follower the second. Every further agent starts in the same shape
     to its predecessor as the second to the first, and keeps to the same law, gains and limits.
+    ``names``: on the wire, of the agents from the third on; without them agent3, agent4 and so on. ``k_v``
+    [m/s], ``k_u`` [rad/s]: what is known of a follower as somebody's predecessor, in place of the leader's;
+    without them the lower of the controller's and the robot's limits.
     """
 
     agents: Annotated[int, Meta(ge=2, le=1000)]
+    names: tuple[Name, ...] = ()
+    k_v: Positive | UnsetType = UNSET
+    k_u: Positive | UnsetType = UNSET
 
 
 class Scenario(_Section, frozen=True, kw_only=True):

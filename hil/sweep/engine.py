@@ -16,11 +16,12 @@ from estimation.tracking import TrackSettings
 from formation.angles import FloatArray
 from formation.leader import Table
 from formation.pose import Pose
-from hil.emulator.mocap import BLOCK, Stream, draw_block
+from hil.emulator.mocap import Stream, block_length, draw_block
 from hil.errors import CheckFailedError, UsageError
 from hil.nodes.lockstep_run import STOPPING_NS
-from hil.scenario.parts import leader_program, start_poses
+from hil.scenario.parts import leader_program
 from hil.scenario.schema import ConstantProgram, ImpulseProgram, Scenario, SinusoidProgram
+from hil.scenario.start import start_poses
 from hil.sweep import engine_kernels as kernels
 
 KINDS = {"ekf": kernels.EKF, "ukf": kernels.UKF, "difference": kernels.DIFFERENCE}
@@ -299,7 +300,7 @@ def _dues(rate: float, seconds: float) -> NDArray[np.int64]:
 
 def _draws(seed: int, stream: Stream, items: int, count: int) -> tuple[FloatArray, FloatArray]:
     """Normals and uniforms of at least so many items, the emulator's own."""
-    blocks = [draw_block(seed, stream, block, count) for block in range(-(-items // BLOCK[stream]))]
+    blocks = [draw_block(seed, stream, block, count) for block in range(-(-items // block_length(stream)))]
     if len(blocks) == 1:
         return blocks[0]
     normal, shares = zip(*blocks, strict=True)

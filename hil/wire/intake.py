@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -55,8 +56,16 @@ class Sighting:
     alpha2: float
 
 
-def read_frame(payload: bytes, leader: str, follower: str, now_ns: int | None = None) -> Frame:
+def read_frame(
+    payload: bytes,
+    leader: str,
+    follower: str,
+    now_ns: int | None = None,
+    others: Collection[str] = (),
+) -> Frame:
     """Decode and check a mocap frame; without ``now_ns`` its stamp may lie in the future.
+
+    ``others``: names of bodies that are known to be there and not looked at.
 
     Raises :class:`RefusedError` by cause: malformed, bad_stamp, unknown_body (it holds strangers only),
     missing_leader, missing_follower, duplicate_body, not_finite, out_of_range, bad_quaternion, tilted (z is
@@ -68,7 +77,7 @@ def read_frame(payload: bytes, leader: str, follower: str, now_ns: int | None = 
     strangers = 0
     for body in message.rigidbodies:
         if body.rigid_body_name not in (leader, follower):
-            strangers += 1
+            strangers += body.rigid_body_name not in others
         elif body.rigid_body_name in bodies:
             raise RefusedError("duplicate_body")
         else:

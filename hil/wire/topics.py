@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from hil.scenario.links import Link, links_of
 from hil.scenario.schema import Scenario
 from hil.wire.message_types import (
     Command,
@@ -29,11 +30,12 @@ MALFORMED = "malformed"
 
 @dataclass(frozen=True, slots=True)
 class Topics:
-    """The topics of one leader and one follower."""
+    """The topics of one leader and one follower. ``truth``: where the emulator tells their true state."""
 
     leader: str
     follower: str
     stamped: bool
+    truth: str = TRUTH
 
     @property
     def leader_odom(self) -> str:
@@ -83,7 +85,7 @@ class Topics:
             self.sighting: typename_of(RangeBearing),
             self.estimate: typename_of(LeaderEstimate),
             self.command: typename_of(Command),
-            TRUTH: typename_of(Truth),
+            self.truth: typename_of(Truth),
             DIAGNOSTICS: typename_of(DiagnosticArray),
             STOP: typename_of(String),
             MALFORMED: typename_of(Malformed),
@@ -91,6 +93,25 @@ class Topics:
 
 
 def topics_of(scenario: Scenario) -> Topics:
-    """Topics of a scenario."""
+    """Topics of a scenario's leader and follower, of a chain the first two agents."""
+    return link_topics(Link(scenario))
+
+
+def link_topics(link: Link) -> Topics:
+    """Topics of a follower and its predecessor. In a chain the truth has the follower's name too."""
+    scenario = link.scenario
     stamped = scenario.controller.command_type == "TwistStamped"
-    return Topics(scenario.leader.name, scenario.follower.name, stamped)
+    truth = f"{scenario.follower.name}/{TRUTH}" if link.in_chain else TRUTH
+    return Topics(scenario.leader.name, scenario.follower.name, stamped, truth)
+
+
+def urgent_topics(scenario: Scenario) -> tuple[str, ...]:
+    """Topics that go ahead of all others: what robots are told to drive, and the stop."""
+    return (*(link_topics(link).cmd_vel for link in links_of(scenario)), STOP)
+
+
+def types_of(scenario: Scenario) -> dict[str, str]:
+    """Type name of every topic of a scenario, those of all pairs of a chain."""
+    return {
+        topic: typename for link in links_of(scenario) for topic, typename in link_topics(link).types.items()
+    }

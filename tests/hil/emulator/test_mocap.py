@@ -17,7 +17,7 @@ UNLIKELY = 1e-3
 
 def test_normals_are_standard_normal_and_uncorrelated() -> None:
     draws = [draw_frame(3, index, DELIVERY) for index in range(COUNT)]
-    columns = np.array([(*draw.leader, *draw.follower) for draw in draws]).T
+    columns = np.array([(*draw.bodies[0], *draw.bodies[1]) for draw in draws]).T
     assert columns.shape == (6, COUNT)
     for column in columns:
         assert kstest(column, "norm").pvalue > UNLIKELY
@@ -48,7 +48,7 @@ def test_what_is_drawn_does_not_depend_on_the_order_of_asking() -> None:
     forward = [draw_frame(6, index, DELIVERY) for index in range(300)]
     backward = [draw_frame(6, index, DELIVERY) for index in reversed(range(300))]
     assert forward == backward[::-1]
-    assert len({draw.leader for draw in forward}) == 300
+    assert len({draw.bodies[0] for draw in forward}) == 300
 
 
 def test_seeds_and_streams_are_independent() -> None:

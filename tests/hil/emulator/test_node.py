@@ -160,7 +160,7 @@ def test_odometry_tells_what_the_wheels_do_and_nothing_while_they_stand() -> Non
 def test_garbage_is_counted_and_moves_nothing(topic: str, payload: bytes) -> None:
     before, _ = told([(10, READY[0])])
     after, _ = told([(20, Event(topic, payload))], state=before)
-    assert after.follower.command == before.follower.command
+    assert after.robots[1].command == before.robots[1].command
     if topic != topics.STOP:
         assert not after.stopped
 
@@ -173,11 +173,11 @@ def test_garbage_on_the_command_topic_is_counted() -> None:
 
 def test_a_command_that_is_not_finite_stops_the_follower() -> None:
     state, _ = told([(10, command(0.2, 0.5)), (20, command(math.nan, 0.5))])
-    assert (state.follower.command.v, state.follower.command.u) == (0.0, 0.0)
+    assert (state.robots[1].command.v, state.robots[1].command.u) == (0.0, 0.0)
 
 
 def test_twist_without_a_stamp_drives_too() -> None:
     node = EmulatorNode(load_scenario("turtlebot3", ["controller.command_type=Twist"]))
     twist = msg.Twist(linear=msg.Vector3(x=0.1, y=0.0, z=0.0), angular=msg.Vector3(x=0.0, y=0.0, z=0.3))
     state, _ = told([(10, Event(node.topics.cmd_vel, encode(twist)))], node)
-    assert (state.follower.command.v, state.follower.command.u) == pytest.approx((0.1, 0.3))
+    assert (state.robots[1].command.v, state.robots[1].command.u) == pytest.approx((0.1, 0.3))

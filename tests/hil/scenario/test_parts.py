@@ -8,7 +8,6 @@ import pytest
 from controllers.laws import Gains
 from controllers.limits import Limits
 from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
-from formation.pose import Pose
 from formation.spacing import Spacing
 from hil.errors import UsageError
 from hil.scenario import parts as scenario_parts
@@ -20,8 +19,6 @@ def test_parts_of_the_robots_experiment_are_the_papers() -> None:
     assert scenario_parts.gains(scenario) == Gains(1.5, 2.0, Spacing(0.2, 20.0))
     assert scenario_parts.limits(scenario) == Limits(0.22, 2.84)
     assert scenario_parts.leader_program(scenario) == Sinusoid(0.08, 0.2, 0.5, 0.5 * math.pi)
-    assert scenario_parts.start_poses(scenario) == (Pose(0.287, 0.005, 1.553), Pose(0.767, 0.685, -1.574))
-    assert scenario_parts.start_shape(scenario).rho == pytest.approx(0.832346, abs=5e-7)
 
 
 @pytest.mark.parametrize(
@@ -45,12 +42,6 @@ def test_a_table_that_runs_backwards_is_named() -> None:
     scenario = load_scenario("turtlebot3", [f"leader.program={table}"])
     with pytest.raises(UsageError, match=r"turtlebot3: leader\.program: .*t\[1\] = 0\.5 after 1\.0"):
         scenario_parts.leader_program(scenario)
-
-
-def test_robots_in_one_place_are_named() -> None:
-    scenario = load_scenario("turtlebot3", ["follower.pose=[0.287, 0.005, 0.0]"])
-    with pytest.raises(UsageError, match=r"both at \(0\.287, 0\.005\)"):
-        scenario_parts.start_poses(scenario)
 
 
 def test_noise_free_run_starts_at_the_start_poses() -> None:

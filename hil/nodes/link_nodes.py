@@ -1,0 +1,17 @@
+"""The nodes of one follower, in a pair or in a chain."""
+
+from __future__ import annotations
+
+from hil.nodes.controller import ControllerNode
+from hil.nodes.estimator import EstimatorNode
+from hil.scenario.links import Link
+
+
+def estimator_node(link: Link) -> EstimatorNode:
+    """Estimator of a follower; it looks at its predecessor and at itself, and at nobody else."""
+    return EstimatorNode(link.scenario, link.node_name("estimator"), link.others)
+
+
+def controller_node(link: Link) -> ControllerNode:
+    """Controller of a follower."""
+    return ControllerNode(link.scenario, link.node_name("controller"))

@@ -1,0 +1,121 @@
+"""A chain as its links: each follower with its predecessor, as a pair of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import msgspec
+from msgspec.structs import replace
+
+from hil.errors import UsageError
+from hil.scenario.schema import ChainSection, Scenario
+from hil.scenario.start import chain_poses
+
+HOSTING = ("estimator", "controller")
+"""The daemons that host a node for every follower."""
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """One follower and the robot that it follows.
+
+    ``scenario``: the two as a pair: their names, start poses, and what is known of the predecessor; the
+    leader's program in it drives the first agent only. ``others``: names of the further robots of the
+    chain, ``in_chain`` whether there is one, ``first`` whether the predecessor is the chain's leader.
+    """
+
+    scenario: Scenario
+    others: frozenset[str] = frozenset()
+    in_chain: bool = False
+    first: bool = True
+
+    @property
+    def leader(self) -> str:
+        """Name of the predecessor."""
+        return self.scenario.leader.name
+
+    @property
+    def follower(self) -> str:
+        """Name of the follower."""
+        return self.scenario.follower.name
+
+    def node_name(self, daemon: str) -> str:
+        """What a daemon's node for this follower is called, in a chain such as estimator/agent3."""
+        return f"{daemon}/{self.follower}" if self.in_chain else daemon
+
+
+def chain_of(scenario: Scenario) -> ChainSection | None:
+    """The chain of a scenario, None for a pair."""
+    return None if isinstance(scenario.chain, msgspec.UnsetType) else scenario.chain
+
+
+def links_of(scenario: Scenario) -> tuple[Link, ...]:
+    """Links of a scenario from the leader on; a pair is a single one.
+
+    Raises :class:`UsageError` for names that are too few, too many, or stand for two robots.
+    """
+    chain = chain_of(scenario)
+    if chain is None:
+        return (Link(scenario),)
+    names = _names(scenario, chain)
+    poses = [(pose.x, pose.y, pose.theta) for pose in chain_poses(scenario, chain.agents)]
+    control, robot = scenario.controller, scenario.robot
+    k_v = min(control.v_max, robot.v_max) if isinstance(chain.k_v, msgspec.UnsetType) else chain.k_v
+    k_u = min(control.u_max, robot.u_max) if isinstance(chain.k_u, msgspec.UnsetType) else chain.k_u
+    links: list[Link] = []
+    for place, ((name, pose), (own_name, own_pose)) in enumerate(pairwise(zip(names, poses, strict=True))):
+        leader = replace(scenario.leader, name=name, pose=pose)
+        pair = replace(
+            scenario,
+            name=f"{scenario.name}/{own_name}",
+            leader=replace(leader, k_v=k_v, k_u=k_u) if place else leader,
+            follower=replace(scenario.follower, name=own_name, pose=own_pose),
+            chain=msgspec.UNSET,
+        )
+        links.append(Link(pair, frozenset(names) - {name, own_name}, in_chain=True, first=not place))
+    return tuple(links)
+
+
+def link_of(scenario: Scenario, follower: str) -> Link:
+    """Link of a follower by its name; :class:`UsageError` if there is none of that name."""
+    links = links_of(scenario)
+    for link in links:
+        if link.follower == follower:
+            return link
+    known = ", ".join(link.follower for link in links)
+    raise UsageError(
+        f"--follower {follower!r}: scenario {scenario.name} has none of that name; one of: {known}"
+    )
+
+
+def node_names(daemon: str, links: Sequence[Link]) -> tuple[str, ...]:
+    """Names under which the nodes of a daemon report."""
+    return tuple(link.node_name(daemon) for link in links) if daemon in HOSTING else (daemon,)
+
+
+def refuse_chain(scenario: Scenario, instead: str) -> None:
+    """Raise :class:`UsageError` if the scenario has a chain; ``instead``: what to do."""
+    chain = chain_of(scenario)
+    if chain is not None:
+        raise UsageError(
+            f"scenario {scenario.name}: it has a [chain] of {chain.agents} agents, expected a pair; {instead}"
+        )
+
+
+def _names(scenario: Scenario, chain: ChainSection) -> tuple[str, ...]:
+    further = chain.names or tuple(f"agent{number}" for number in range(3, chain.agents + 1))
+    if len(further) != chain.agents - 2:
+        raise UsageError(
+            f"scenario {scenario.name}: chain.names has {len(further)}, expected {chain.agents - 2}: one for "
+            f"each of the {chain.agents} agents from the third on"
+        )
+    names = (scenario.leader.name, scenario.follower.name, *further)
+    twice = next((name for place, name in enumerate(names) if name in names[:place]), None)
+    if twice is not None:
+        raise UsageError(
+            f"scenario {scenario.name}: {twice!r} stands for two robots of the chain, expected names that "
+            "differ; set leader.name, follower.name and chain.names"
+        )
+    return names
