@@ -12,6 +12,7 @@ import click
 from hil.errors import CheckFailedError, UsageError
 from hil.report_json import print_json, write_json
 from hil.scenario.files import load_scenario, refuse_unrunnable
+from hil.scenario.links import refuse_chain
 from hil.scenario.schema import Scenario
 
 DURATION = click.FloatRange(min=0, min_open=True)
@@ -53,6 +54,7 @@ def command(
     options = [f"{key}={value}" for key, value in given.items() if value is not None]
     chosen = load_scenario(scenario, [*overrides, *options])
     refuse_unrunnable(chosen)
+    refuse_chain(chosen, f"abreast simulate {chosen.name} runs the chain")
     folder = _folder(chosen, out)
     log_path = folder / "run.mcap"
     if log_path.exists():

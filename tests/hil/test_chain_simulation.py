@@ -10,7 +10,7 @@ import pytest
 
 from hil.chain_simulation import simulate_chain_of
 from hil.errors import CheckFailedError, UsageError
-from hil.scenario.files import load_scenario, refuse_unrunnable
+from hil.scenario.files import load_scenario
 
 
 def report_of(name: str, *overrides: str, agents: int = 5, out: Path | None = None) -> dict[str, Any]:
@@ -73,8 +73,6 @@ def test_mistakes_are_named(tmp_path: Path) -> None:
         load_scenario("chain5", ["chain.agent=3"])
     with pytest.raises(UsageError, match=r"controller\.tilt"):
         load_scenario("chain5", ["controller.tilt=1.6"])
-    with pytest.raises(UsageError, match="abreast simulate chain5"):
-        refuse_unrunnable(load_scenario("chain5"))
     with pytest.raises(CheckFailedError, match="breaks down"):
         report_of("chain5", 'leader.program={kind = "constant", v = 1e308}')
     (tmp_path / "file").write_text("")
