@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controllers.chain import ChainTrajectory
+from formation.angles import FloatArray
 from formation.closed_loop import IntegrationError
 from formation.station import Station
 from hil.errors import CheckFailedError, UsageError
 from hil.figures.chain_figures import draw_chain
 from hil.scenario import parts as scenario_parts
 from hil.scenario.schema import Scenario
+from hil.track_table import write_tracks
 
 SAMPLE_STEP = 0.01
 MOST_CELLS = 20_000_000
 """Numbers that a run may keep: longer runs of longer chains are sampled more coarsely."""
-MOST_WRITTEN = 2_000_000
 SETTLED_RHO, SETTLED_ANGLE = 0.02, math.pi / 180.0
 """A pair has settled once its distance stays within this share and its bearings within this angle [rad]."""
 
@@ -87,29 +86,18 @@ def _write(scenario: Scenario, trajectory: ChainTrajectory, settled: list[float 
     until = max(_SHOWN_AFTER * last, _SHOWN_AT_LEAST * float(trajectory.t[-1]))
     try:
         out.mkdir(parents=True, exist_ok=True)
-        _write_csv(trajectory, out / "trajectory.csv")
+        agents = (trajectory.poses, trajectory.v, trajectory.u)
+        write_tracks(out / "trajectory.csv", trajectory.t, *agents, _shapes(trajectory))
         draw_chain(scenario, trajectory, until, out / "chain.png")
     except OSError as error:
         raise UsageError(f"{out}: cannot be written ({error.strerror}); choose another --out") from error
 
 
-def _write_csv(trajectory: ChainTrajectory, path: Path) -> None:
-    """One row per sample: per agent pose and motion, per pair shape; agents count from 1, as pairs do."""
-    header, columns = ["t"], [trajectory.t]
-    for agent in range(trajectory.v.shape[1]):
-        header += [f"{name}_{agent + 1}" for name in ("x", "y", "theta", "v", "u")]
-        columns += [*trajectory.poses[:, agent].T, trajectory.v[:, agent], trajectory.u[:, agent]]
-    for pair in range(trajectory.rho.shape[1]):
-        header += [f"{name}_{pair + 1}_{pair + 2}" for name in ("rho", "alpha1", "alpha2")]
-        columns += [each[:, pair] for each in (trajectory.rho, trajectory.alpha1, trajectory.alpha2)]
-    table = np.column_stack(columns)[_kept_rows(len(trajectory.t), len(columns))]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(table.tolist())
-
-
-def _kept_rows(rows: int, columns: int) -> NDArray[np.intp]:
-    """Rows to write, evenly spread with the first and the last among them, so that the file stays small."""
-    most = max(2, MOST_WRITTEN // columns)
-    return np.unique(np.linspace(0, rows - 1, min(rows, most)).round().astype(np.intp))
+def _shapes(trajectory: ChainTrajectory) -> dict[str, FloatArray]:
+    """Columns of the pairs' shapes; agents count from 1, as pairs do."""
+    columns = {"rho": trajectory.rho, "alpha1": trajectory.alpha1, "alpha2": trajectory.alpha2}
+    return {
+        f"{name}_{pair + 1}_{pair + 2}": values[:, pair]
+        for pair in range(trajectory.rho.shape[1])
+        for name, values in columns.items()
+    }

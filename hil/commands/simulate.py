@@ -32,7 +32,7 @@ def command(
 ) -> None:
     """Integrate SCENARIO without noise or delay, as the paper does, and report on it.
 
-    A pair drives without limits, a chain of agents within them.
+    A pair drives without limits, a chain or a flock of agents within them.
     """
     chosen = [*overrides]
     if law is not None:
@@ -50,12 +50,28 @@ def command(
 
 
 def _simulate(scenario: Scenario, out: Path | None, *, stability: bool) -> dict[str, object]:
-    if isinstance(scenario.chain, msgspec.UnsetType):
-        from hil.simulation import simulate
+    chain, flock = scenario.chain, scenario.flock
+    if not isinstance(chain, msgspec.UnsetType):
+        _refuse_what_is_for_a_pair(scenario, "chain", stability=stability)
+        if not isinstance(flock, msgspec.UnsetType):
+            raise UsageError(
+                f"scenario {scenario.name}: it has a [chain] and a [flock]; leave one of them out"
+            )
+        from hil.chain_simulation import simulate_chain_of
 
-        return simulate(scenario, out, stability=stability)
-    if stability:
-        raise UsageError(f"--stability is for a pair, and {scenario.name} has a [chain]; leave it out")
-    from hil.chain_simulation import simulate_chain_of
+        return simulate_chain_of(scenario, chain.agents, out)
+    if not isinstance(flock, msgspec.UnsetType):
+        _refuse_what_is_for_a_pair(scenario, "flock", stability=stability)
+        from hil.flock_simulation import simulate_flock_of
 
-    return simulate_chain_of(scenario, scenario.chain.agents, out)
+        return simulate_flock_of(scenario, flock, out)
+    from hil.simulation import simulate
+
+    return simulate(scenario, out, stability=stability)
+
+
+def _refuse_what_is_for_a_pair(scenario: Scenario, section: str, *, stability: bool) -> None:
+    asked = {"--stability": stability, "formation.change_sides_at_s": scenario.formation.change_sides_at_s}
+    for name, given in asked.items():
+        if given:
+            raise UsageError(f"{name} is for a pair, and {scenario.name} has a [{section}]; leave it out")

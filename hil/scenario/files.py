@@ -47,13 +47,18 @@ def build_scenario(
 def refuse_unrunnable(scenario: Scenario) -> None:
     """Raise :class:`UsageError` if the scenario can be simulated or replayed only, not driven.
 
-    That is one with an estimator that needs to know the future, or changes of side.
+    That is one with an estimator that needs to know the future, a flock of agents, or changes of side.
     """
     kind = scenario.estimator.kind
     if kind in OFFLINE_ESTIMATORS:
         raise UsageError(
             f"estimator.kind is {kind!r}: it needs a whole log; run with another one, then "
             f"abreast replay LOG --estimator {kind}"
+        )
+    if not isinstance(scenario.flock, msgspec.UnsetType):
+        raise UsageError(
+            f"scenario {scenario.name}: it has a [flock] of {scenario.flock.agents} agents, expected a pair; "
+            f"abreast simulate {scenario.name} runs the flock"
         )
     if scenario.formation.change_sides_at_s:
         raise UsageError(

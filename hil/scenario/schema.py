@@ -256,6 +256,24 @@ class ChainSection(_Section, frozen=True, kw_only=True):
     k_u: Positive | UnsetType = UNSET
 
 
+class FlockSection(_Section, frozen=True, kw_only=True):
+    """A flock of agents in an arrowhead: each follows the mean of its nearest neighbours, within the limits.
+
+    Its places have the distance ``formation.rho_0`` from each other and the leader at the tip; whom an agent
+    follows it chooses anew every ``choose_every_s``, among those that it sees at least ``least_bearing``
+    [rad] off straight ahead. The followers start off their places by at most ``scatter`` [m] along each axis
+    and ``scatter_heading`` [rad], at random by ``run.seed``. The formation's side and bearing and the
+    follower's pose are not looked at.
+    """
+
+    agents: Annotated[int, Meta(ge=2, le=2000)]
+    neighbours: Annotated[int, Meta(ge=1, le=50)] = 3
+    choose_every_s: Annotated[float, Meta(ge=0.01)] = 0.5
+    least_bearing: Annotated[float, Meta(gt=0.0, le=0.5 * math.pi)] = math.pi / 7.0
+    scatter: NonNegative = 0.0
+    scatter_heading: Annotated[float, Meta(ge=0.0, le=math.pi)] = 0.0
+
+
 class Scenario(_Section, frozen=True, kw_only=True):
     """A whole experiment. Build it with :func:`hil.scenario.files.load_scenario`."""
 
@@ -270,3 +288,4 @@ class Scenario(_Section, frozen=True, kw_only=True):
     mocap: MocapSection = MocapSection()
     estimator: EstimatorSection = EstimatorSection()
     chain: ChainSection | UnsetType = UNSET
+    flock: FlockSection | UnsetType = UNSET

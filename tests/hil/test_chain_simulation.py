@@ -59,7 +59,7 @@ def test_files_hold_every_agent(tmp_path: Path) -> None:
 
 
 def test_a_long_chain_is_written_more_coarsely(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hil.chain_simulation.MOST_WRITTEN", 3000)
+    monkeypatch.setattr("hil.track_table.MOST_WRITTEN", 3000)
     report_of("chain5", "run.duration_s=5.0", agents=20, out=tmp_path)
     lines = (tmp_path / "trajectory.csv").read_text().splitlines()
     assert 2 <= len(lines) - 1 <= 3000 // 157
