@@ -211,6 +211,18 @@ def test_behind_the_beam_of_a_turning_leader_an_agent_rests_where_the_docs_say(u
     assert GAINS.spacing.f(rho) == pytest.approx(-MU1 * lean / V1, abs=1e-6)
 
 
+@pytest.mark.parametrize(("share", "holds"), [(0.97, True), (1.03, False)])
+def test_a_steady_turn_towards_an_agent_behind_the_beam_is_held_up_to_the_fold(
+    share: float, holds: bool
+) -> None:
+    places = np.array([(0.0, 0.0), (-0.5 * SPACING, -SPACING * math.sqrt(0.75))])
+    hardest = 2.0 / (3.0 * math.sqrt(3.0)) * MU_RHO * V1**2 / (MU1 * 0.5 * SPACING)
+    first = np.column_stack([places, np.zeros(2)])
+    turn = Constant(V1, -share * hardest)
+    run = flown(first, 120.0, places=places, program=turn, limits=FREE, knows_turn=True)
+    assert (float(run.rho[-1, 1]) < SPACING * math.sqrt(3.0)) is holds
+
+
 def test_a_mirrored_flock_flies_the_mirrored_way() -> None:
     first = scattered(PLACES, 7, 0.15, 0.5)
     partner = np.array([0, *(k + 1 if k % 2 else k - 1 for k in range(1, len(PLACES)))])
