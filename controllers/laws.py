@@ -114,8 +114,10 @@ def independent(shape: Shape, v1: float, u1: float, gains: Gains, limits: Limits
     return _steered(shape, v1, independent_speed(shape, v1, gains), gains, limits)
 
 
-LAWS: Mapping[str, Law] = MappingProxyType({"independent": independent, "ideal": ideal, "feedforward": ideal})
-"""Laws by name. ``ideal`` and ``feedforward`` are one law, the one told u1 and the other estimating it."""
+LAWS: Mapping[str, Law] = MappingProxyType(
+    {"independent": independent, "ideal": ideal, "feedforward": ideal, "faded": ideal}
+)
+"""Laws by name. The last three are one: they differ by where u1 is from (:mod:`controllers.feedforward`)."""
 
 
 def _steered(shape: Shape, v1: float, v2: float, gains: Gains, limits: Limits | None) -> Motion:

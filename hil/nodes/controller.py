@@ -8,6 +8,7 @@ from dataclasses import replace as with_changes
 from msgspec import Struct, field
 from msgspec.structs import replace
 
+from controllers.feedforward import TurnTrend
 from controllers.guard import Decision, decide
 from controllers.laws import LAWS
 from controllers.resolution import NOTHING_OWED, Resolution
@@ -26,7 +27,7 @@ from hil.nodes.node import (
     no_counts,
     outgoing,
 )
-from hil.scenario.parts import gains, limits
+from hil.scenario.parts import foresight, gains, limits
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -47,8 +48,9 @@ class ControllerState(Struct, frozen=True):
 
     ``estimate``: the newest one that may move the robot; ``status``: of the newest one of any kind.
     ``sent``: commands since that estimate's capture, oldest first, and the one before. ``leader_u1``: the
-    turn rate that the leader was told to drive, kept for the law ``ideal``, nan before it is known. ``owed``:
-    what rounding to the robot's steps took off the last command.
+    turn rate that the leader was told to drive, kept for the law ``ideal``, nan before it is known.
+    ``trend``: of the estimated turn rate, kept for the laws that feed it forward. ``owed``: what rounding to
+    the robot's steps took off the last command.
     """
 
     estimate: Estimate | None = None
@@ -61,6 +63,7 @@ class ControllerState(Struct, frozen=True):
     decided: Counts = field(default_factory=no_counts)
     heard: bool = False
     leader_u1: float = math.nan
+    trend: TurnTrend | None = None
     next_tick_ns: int = 0
     next_diagnostics_ns: int = 0
 
@@ -81,6 +84,8 @@ class ControllerNode:
         self.ahead_ns = self.transport_ns + round(given.lag_s / _NS)
         self.tick_ns = round(1.0 / given.tick_hz / _NS)
         self.needs_u1 = given.law == "ideal"
+        self.fades = given.law == "faded"
+        self.foresight = foresight(scenario) if given.law in ("feedforward", "faded") else None
         leader = (self.topics.leader_cmd_vel,) if self.needs_u1 else ()
         self.subscribes: tuple[str, ...] = (self.topics.estimate, topics.STOP, *leader)
 
@@ -111,6 +116,8 @@ class ControllerNode:
             fresh = estimate.status is Status.TRACKING
             kept = estimate if fresh else state.estimate
             state = replace(state, status=estimate.status, heard=True, estimate=kept)
+            if fresh:
+                state = replace(state, trend=self._trend(state, estimate, now_ns))
         elif event.topic == self.topics.leader_cmd_vel:
             return self._hear_leader(state, event.payload), ()
         elif event.topic:
@@ -150,9 +157,9 @@ class ControllerNode:
         age: float | None = None
         if estimate is not None:
             age = (now_ns - estimate.measured_ns) * _NS
-            u1 = state.leader_u1 if self.needs_u1 else estimate.u1
             if age <= self.max_age and _can_be(estimate):
                 shape = predict_shape(estimate, state.sent, now_ns + self.ahead_ns, self.lag)
+                u1 = self._leader_turn(state, estimate, now_ns)
                 wanted = self.law(shape, estimate.v1, u1, self.gains, self.limits)
             else:
                 wanted = Motion(math.nan, math.nan)
@@ -165,6 +172,28 @@ class ControllerNode:
             lost=state.status is Status.LOST,
             stopped=state.stopped,
         )
+
+    def _trend(self, state: ControllerState, estimate: Estimate, now_ns: int) -> TurnTrend | None:
+        """Trend with an estimate in it; what no sound estimator gives is not to stay in it, and ends it."""
+        variance = float(estimate.covariance[4, 4])
+        if self.foresight is None or not (abs(estimate.u1) < _LARGEST and 0.0 <= variance < _LARGEST):
+            return None
+        ahead = self._ahead(estimate, now_ns)
+        return self.foresight.heard(state.trend, estimate.capture_ns, estimate.u1, variance, ahead)
+
+    def _leader_turn(self, state: ControllerState, estimate: Estimate, now_ns: int) -> float:
+        """The leader's turn rate when a command acts, as it is told or foreseen; nan where neither is."""
+        if self.foresight is None:
+            return state.leader_u1 if self.needs_u1 else estimate.u1
+        if state.trend is None:
+            return math.nan
+        u1 = self.foresight.predicted(state.trend)
+        ahead = self._ahead(estimate, now_ns)
+        return u1 * self.foresight.weight(state.trend.variance, ahead) if self.fades else u1
+
+    def _ahead(self, estimate: Estimate, now_ns: int) -> float:
+        """Time [s] from the capture of an estimate to when a command of now acts."""
+        return (now_ns + self.ahead_ns - estimate.capture_ns) * _NS
 
     def _recent(
         self, sent: tuple[SentCommand, ...], estimate: Estimate | None, now_ns: int

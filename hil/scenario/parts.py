@@ -7,9 +7,11 @@ one place) is answered here, with a :class:`~hil.errors.UsageError` that names t
 from __future__ import annotations
 
 from controllers.chain import ChainTrajectory, simulate_chain
+from controllers.feedforward import Foresight
 from controllers.laws import LAWS, Gains, independent
 from controllers.limits import Limits
 from controllers.side_change_run import run_with_changes
+from estimation.motion import LeaderLimits, ProcessNoise
 from formation.angles import FloatArray
 from formation.closed_loop import FollowerLaw, Trajectory, simulate_pair
 from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
@@ -52,6 +54,14 @@ def station(scenario: Scenario) -> Station:
 def limits(scenario: Scenario) -> Limits:
     """Limits that the controller keeps to."""
     return Limits(scenario.controller.v_max, scenario.controller.u_max)
+
+
+def foresight(scenario: Scenario) -> Foresight:
+    """What is known of the leader's steering; its diffusion is that of the estimator's own model."""
+    leader, given = scenario.leader, scenario.estimator
+    limits = LeaderLimits(leader.v_eps, leader.k_v, leader.k_u)
+    noise = ProcessNoise.by_rule(limits, given.turn_bandwidth, given.speed_bandwidth)
+    return Foresight(leader.k_u, noise.q_u)
 
 
 def follower_law(scenario: Scenario) -> FollowerLaw:

@@ -18,7 +18,7 @@ Probability = Annotated[float, Meta(ge=0.0, lt=1.0)]
 Name = Annotated[str, Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 PoseTriple = tuple[float, float, float]
 
-LawName = Literal["independent", "ideal", "feedforward"]
+LawName = Literal["independent", "ideal", "feedforward", "faded"]
 EstimatorName = Literal["ekf", "ukf", "ekf-filterpy", "ukf-filterpy", "imm", "shape-ekf", "mhe", "difference"]
 OfflineName = Literal["smoother"]
 OFFLINE_ESTIMATORS: tuple[OfflineName, ...] = get_args(OfflineName)
@@ -56,7 +56,7 @@ class ControllerSection(_Section, frozen=True, kw_only=True):
     """The follower's law, its gains, and what the guard and the prediction assume.
 
     ``law``: independent of the leader's turn rate, ideal as the leader tells it, feedforward of the estimated
-    one.
+    one, faded of as much of that as its variance allows.
     ``max_age_s``: oldest measurement a command may rest on. ``lag_s``, ``transport_s``: actuator lag and
     command transport time that the prediction looks ahead by. ``v_resolution``, ``u_resolution``: steps of
     the robot's link, into which commands are rounded so that nothing is lost on average; 0 for a link that

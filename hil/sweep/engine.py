@@ -19,13 +19,18 @@ from formation.pose import Pose
 from hil.emulator.mocap import Stream, block_length, draw_block
 from hil.errors import CheckFailedError, UsageError
 from hil.nodes.lockstep_run import STOPPING_NS
-from hil.scenario.parts import leader_program
+from hil.scenario.parts import foresight, leader_program
 from hil.scenario.schema import ConstantProgram, ImpulseProgram, Scenario, SinusoidProgram
 from hil.scenario.start import start_poses
 from hil.sweep import engine_kernels as kernels
 
 KINDS = {"ekf": kernels.EKF, "ukf": kernels.UKF, "difference": kernels.DIFFERENCE}
-LAWS = {"independent": kernels.INDEPENDENT, "ideal": kernels.IDEAL, "feedforward": kernels.FEEDFORWARD}
+LAWS = {
+    "independent": kernels.INDEPENDENT,
+    "ideal": kernels.IDEAL,
+    "feedforward": kernels.FEEDFORWARD,
+    "faded": kernels.FADED,
+}
 LONGEST_LATENCY = 1.0
 """Seconds of latency that the history of odometry surely covers."""
 
@@ -271,6 +276,7 @@ def _hand(scenario: Scenario) -> dict[str, float]:
         "u_limit": given.u_max,
         "v_step": given.v_resolution,
         "u_step": given.u_resolution,
+        "spread": foresight(scenario).spread,
     }
 
 

@@ -30,7 +30,7 @@ Record = Any
 _F = TypeVar("_F", bound=Callable[..., object])
 
 EKF, UKF, DIFFERENCE = 0, 1, 2
-INDEPENDENT, IDEAL, FEEDFORWARD = 0, 1, 2
+INDEPENDENT, IDEAL, FEEDFORWARD, FADED = 0, 1, 2, 3
 CONSTANT, SINUSOID, IMPULSE, TABLE = 0, 1, 2, 3
 INITIALISING, TRACKING, COASTING, REJECTING, LOST = 0, 1, 2, 3, 4
 DRIVING, STOPPED, NO_ESTIMATE, GIVEN_UP, NOT_SETTLED, STALE, NOT_FINITE = 0, 1, 2, 3, 4, 5, 6
@@ -69,7 +69,7 @@ RULES = _fields(
     "odometry_sigma_v odometry_sigma_u loss p0 p1 p2 p3 "
     "q_v q_u q_start v_eps k_v k_u sd_position sd_heading sd_v2 sd_u2 gate coast_after lost_after "
     "settled_heading unsettled_heading doubt_for cutoff "
-    "max_age assumed_lag mu1 mu2 mu_rho rho_0 v_limit u_limit v_step u_step",
+    "max_age assumed_lag mu1 mu2 mu_rho rho_0 v_limit u_limit v_step u_step spread",
 )
 """All that is fixed in a run. p0 to p3: the fields of the leader's program in :mod:`formation.leader`."""
 
@@ -78,7 +78,7 @@ LOOP = _fields(
     "heard begun track_ns used_ns track_frame gated settled nursed nursed_frame doubt_ns estimator_tick_ns "
     "estimator_report_ns published_ns told "
     "status known capture_ns measured_ns first_sent sent controller_tick_ns controller_report_ns",
-    "leader_u1 nis doubt_position doubt_heading x y vx vy u1 v2 u2 owed_v owed_u",
+    "leader_u1 slow_u1 var_u1 nis doubt_position doubt_heading x y vx vy u1 v2 u2 owed_v owed_u",
 )
 """All that changes besides robots and beliefs. The floats from x on: what the controller knows."""
 
@@ -888,12 +888,21 @@ def _status(loop: Record, rules: Record, now_ns: int) -> int:
 
 
 @_compiled()
-def _tell_controller(loop: Record, b: Record, pose: Record, frame: Record) -> None:
+def _tell_controller(
+    loop: Record, rules: Record, b: Record, pose: Record, frame: Record, now_ns: int
+) -> None:
     """Hand over an estimate that may move the robot, along the follower's axes."""
     dx, dy, c, s = b.x - pose.x, b.y - pose.y, pose.cos, pose.sin
     loop.x, loop.y = c * dx + s * dy, c * dy - s * dx
     loop.vx, loop.vy = c * b.vx + s * b.vy, c * b.vy - s * b.vx
-    loop.u1, loop.v2, loop.u2 = b.u, frame.v2, frame.u2
+    ahead = (now_ns + rules.ahead_ns - loop.track_ns) * _NS
+    window = 0.5 * (b.u_u + rules.q_u * ahead) / rules.q_u
+    if not loop.known:
+        loop.slow_u1 = b.u
+    else:
+        share = -math.expm1(-((loop.track_ns - loop.capture_ns) * _NS) / window) if window > 0.0 else 1.0
+        loop.slow_u1 += share * (b.u - loop.slow_u1)
+    loop.u1, loop.var_u1, loop.v2, loop.u2 = b.u, b.u_u, frame.v2, frame.u2
     loop.known, loop.capture_ns, loop.measured_ns = 1, loop.track_ns, loop.used_ns
 
 
@@ -905,7 +914,7 @@ def _publish(run: Record, now_ns: int) -> None:
     loop.published_ns = now_ns
     track = _belief(run.beliefs, _TRACK)
     if loop.status == TRACKING:
-        _tell_controller(loop, track, run.watch, _frame(run.frames, loop.track_frame))
+        _tell_controller(loop, rules, track, run.watch, _frame(run.frames, loop.track_frame), now_ns)
     if rules.from_ns >= 0 and (loop.since_ns < 0 or loop.track_ns < loop.since_ns + rules.from_ns):
         return
     told = _told(run.told, loop.told)
@@ -997,8 +1006,20 @@ def _wanted(loop: Record, rules: Record, sent: int, arcs: int, now_ns: int) -> t
     rho = math.sqrt(dx * dx + dy * dy)
     one = (dx * lc + dy * ls) / rho, (dy * lc - dx * ls) / rho
     two = -(dx * fc + dy * fs) / rho, (dx * fs - dy * fc) / rho
-    leader_u1 = loop.leader_u1 if rules.law == IDEAL else loop.u1
-    return _law(rules, leader_u1, v1, rho, one, two)
+    return _law(rules, _leader_turn(loop, rules, total), v1, rho, one, two)
+
+
+@_compiled()
+def _leader_turn(loop: Record, rules: Record, ahead: float) -> float:
+    """The leader's turn rate as told, or as foreseen (``controllers.feedforward``)."""
+    told: float = loop.leader_u1
+    if rules.law == IDEAL:
+        return told
+    u1: float = max(-rules.k_u, min(rules.k_u, loop.u1 + 2.0 * (loop.u1 - loop.slow_u1)))
+    if rules.law == FADED:
+        doubt = (loop.var_u1 + rules.q_u * ahead) / rules.spread
+        u1 *= max(0.0, 1.0 - doubt * doubt)
+    return u1
 
 
 @_compiled()

@@ -238,6 +238,20 @@ def test_feed_forward_takes_the_turn_rate_of_the_estimate() -> None:
     assert turning[0].v2_wanted - without[0].v2_wanted == pytest.approx(0.25 * 0.4, rel=0.2)
 
 
+def test_a_turn_rate_that_nobody_can_know_is_not_fed_forward() -> None:
+    node = ControllerNode(load_scenario("turtlebot3", ["controller.law=faded"]))
+    _, plain, _ = fed([(NOW_NS, estimate())])
+    # The matrix is the unit matrix: a standard deviation of 1 rad/s, of a leader that turns at 0.7 at most.
+    _, doubtful, _ = fed([(NOW_NS, estimate())], node)
+    assert doubtful[0].v2_wanted == plain[0].v2_wanted
+    sure = estimate(covariance=1e-6 * np.eye(5).reshape(25))
+    _, commands, _ = fed([(NOW_NS, sure)], node)
+    assert commands[0].v2_wanted > plain[0].v2_wanted + 0.05
+    torn = estimate(covariance=np.full(25, math.nan))
+    _, commands, _ = fed([(NOW_NS, torn), (NOW_NS, sure)], node)
+    assert [command.stop for command in commands] == ["not finite", ""]
+
+
 def test_the_ideal_law_waits_for_the_leaders_turn_rate_and_uses_it() -> None:
     node = ControllerNode(load_scenario("turtlebot3", ["controller.law=ideal"]))
     turning, straight = (

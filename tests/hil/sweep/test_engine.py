@@ -52,6 +52,7 @@ CASES = [
     ["estimator.kind=ekf", "controller.law=independent", *SMOOTH],
     ["estimator.kind=ekf", "controller.law=ideal", *SLOW],
     ["estimator.kind=ekf", "controller.law=feedforward", *SLOW],
+    ["estimator.kind=ukf", "controller.law=faded", *SMOOTH],
     ["estimator.kind=ekf", *TORN],
     [
         "estimator.kind=ekf",

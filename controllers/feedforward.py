@@ -1,0 +1,93 @@
+"""The leader's turn rate at the moment a command acts, out of estimates that come late, and its worth.
+
+A filter that takes u1 for a random walk of diffusion q tracks a ramp of u1 with a lag of P / q, P being the
+variance of u1 that it reports: for the position-fed filter of three integrations in a row, in the steady
+state, P = 2 q / w0 and its response is the third-order Butterworth low-pass of corner w0, whose delay is
+2 / w0. With the time T from the capture to when the command acts, the estimate is behind by
+
+    D = P / q + T = V / q,    V = P + q T, the variance of the estimate held to that moment.
+
+Held, it would cost a pair the phase of that delay. It is carried on instead by its slope times D, the slope
+from a low-pass of time constant D / 2. For steering u1 of frequency w and variance S, holding leaves an error
+of w D u1, of variance V = (w D)^2 S. Carrying on leaves ((w D)^2 / 2 + w D w D / 2) u1, the remainder of the
+expansion and the lag of the slope: a variance E = V^2 / S.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from controllers.limits import clip
+
+_NS = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class TurnTrend:
+    """What was heard of the leader's turn rate: the newest estimate, its variance, and a low-pass of all.
+
+    ``capture_ns`` of the newest; ``u1`` and ``slow`` in rad/s, ``variance`` in rad^2/s^2.
+    """
+
+    capture_ns: int
+    u1: float
+    variance: float
+    slow: float
+
+
+@dataclass(frozen=True, slots=True)
+class Foresight:
+    """What is known of the leader's steering: |u1| <= k_u [rad/s], and diffusion [rad^2/s^3] of u1.
+
+    Raises :class:`ValueError` unless both are positive and finite.
+    """
+
+    k_u: float
+    diffusion: float
+
+    def __post_init__(self) -> None:
+        for name, value in (("k_u", self.k_u), ("diffusion", self.diffusion)):
+            if not (value > 0.0 and math.isfinite(value)):
+                raise ValueError(f"{name} is {value}, expected a positive finite number")
+
+    @property
+    def spread(self) -> float:
+        """Variance S [rad^2/s^2] of u1 before anything is seen: that of sinusoidal steering to the limit."""
+        return 0.5 * self.k_u * self.k_u
+
+    def heard(
+        self, before: TurnTrend | None, capture_ns: int, u1: float, variance: float, ahead: float
+    ) -> TurnTrend:
+        """Trend with one more estimate in it; its capture lies ``ahead`` [s] before the command acts."""
+        if before is None:
+            return TurnTrend(capture_ns, u1, variance, u1)
+        since = max(0, capture_ns - before.capture_ns) * _NS
+        window = 0.5 * self._behind(variance, ahead)
+        share = -math.expm1(-since / window) if window > 0.0 else 1.0
+        return TurnTrend(capture_ns, u1, variance, before.slow + share * (u1 - before.slow))
+
+    def predicted(self, trend: TurnTrend) -> float:
+        """Turn rate [rad/s] when the command acts, within the leader's limit.
+
+        The slope is (u1 - slow) / (D / 2), so that the step by D comes to twice the difference.
+        """
+        return clip(trend.u1 + 2.0 * (trend.u1 - trend.slow), self.k_u)
+
+    def weight(self, variance: float, ahead: float) -> float:
+        """Share of the prediction to feed forward, in [0, 1]; the rest is left to the feedback.
+
+        To feed forward w times the prediction leaves (1 - w)^2 S + w^2 E to the feedback if its error is
+        independent of u1: least for w = S / (S + E), the combination of the prediction with the prior
+        u1 = 0. Taken is 1 - E / S, the share of the prior variance that the prediction removes: the same to
+        first order, never more, and zero from where the estimate held is no better than no estimate (V = S)
+        and the expansion behind E has long ended.
+        """
+        doubt = self._held(variance, ahead) / self.spread
+        return max(0.0, 1.0 - doubt * doubt)
+
+    def _held(self, variance: float, ahead: float) -> float:
+        return variance + self.diffusion * ahead
+
+    def _behind(self, variance: float, ahead: float) -> float:
+        return self._held(variance, ahead) / self.diffusion
