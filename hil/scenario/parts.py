@@ -92,7 +92,7 @@ def noise_free_run(scenario: Scenario, times: FloatArray) -> Trajectory:
         limits(scenario),
         changes,
         times,
-        knows_turn=scenario.controller.law == "ideal",
+        knows_turn=scenario.controller.law != "independent",
     )
 
 

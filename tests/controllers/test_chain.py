@@ -94,7 +94,7 @@ def test_the_compiled_chain_is_that_of_the_laws(
         Shape(0.6, station.alpha1, station.alpha2),
     ]
     times = np.linspace(0.0, 6.0, 31)
-    ours = simulate_chain(FIRST, shapes, program, gains, limits, times, knows_turn=law == "ideal")
+    ours = simulate_chain(FIRST, shapes, program, gains, limits, times, knows_turn=law != "independent")
     known = in_the_world(shapes, program, law, gains, limits, times)
     np.testing.assert_allclose(ours.poses[:, :, :2], known[:, :, :2], atol=2e-7)
     np.testing.assert_allclose(wrap(ours.poses[:, :, 2] - known[:, :, 2]), 0.0, atol=2e-7)
@@ -116,7 +116,7 @@ def test_a_chain_of_two_without_limits_is_the_pair(
     rho: float, alpha1: float, alpha2: float, law: str
 ) -> None:
     shape, times = Shape(rho, alpha1, alpha2), np.linspace(0.0, 8.0, 9)
-    chain = simulate_chain(FIRST, [shape], IMPULSE, GAINS, FREE, times, knows_turn=law == "ideal")
+    chain = simulate_chain(FIRST, [shape], IMPULSE, GAINS, FREE, times, knows_turn=law != "independent")
     follower = follower_pose(shape, FIRST)
     pair = simulate_pair(FIRST, follower, IMPULSE, lambda s, v, u: LAWS[law](s, v, u, GAINS), times)
     np.testing.assert_allclose(chain.rho[:, 0], pair.rho, rtol=1e-7)

@@ -100,13 +100,14 @@ def test_at_any_station_alpha1_and_alpha2_move_as_derived(shape: Shape, leader: 
 def test_behind_the_beam_v1_falls_wherever_the_derivation_says_so(
     rho: float, alpha1: float, leader: Motion, gains: Gains
 ) -> None:
-    """V1_dot <= 0 for 0 <= mu1 rho cos(bearing) <= 4 v1, whatever alpha1 is."""
+    """V1_dot <= 0 for 0 <= mu1 rho cos(bearing) <= 4 v1 behind a leader that drives straight."""
     station, spacing = gains.station, gains.spacing
     if not 0.0 <= gains.mu1 * rho * station.cos <= 4.0 * leader.v:
         return
     shape = Shape(rho, alpha1, station.alpha2)
-    v2 = ideal_speed(shape, leader.v, leader.u, gains)
-    rates = shape_rates(shape, leader, Motion(v2, 0.0))
+    straight = Motion(leader.v, 0.0)
+    v2 = ideal_speed(shape, leader.v, 0.0, gains)
+    rates = shape_rates(shape, straight, Motion(v2, 0.0))
     f, off = spacing.f(rho), station.offset(alpha1)
     V1_dot = math.sin(off) * rates.alpha1_dot + abs(station.sin) * f * rates.rho_dot
     assert V1_dot <= 1e-9 * (1.0 + f * f) * (1.0 + abs(v2) / rho)
