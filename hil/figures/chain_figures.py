@@ -47,12 +47,22 @@ def draw_chain(scenario: Scenario, trajectory: ChainTrajectory, until: float, pa
     _draw_agents(rows[2], trajectory.t, trajectory.u, colours)
     rows[2].set_ylabel("$u_i$ [rad/s]")
     draw_curvatures(rows[3], trajectory, colours)
+    share_time_axis(rows, trajectory.t)
+    save(figure, path)
+
+
+def share_time_axis(rows: list[Axes], t: FloatArray) -> None:
+    """Give panels that stand above each other the same time axis, labelled below the last."""
     for axes in rows:
-        axes.set_xlim(float(trajectory.t[0]), float(trajectory.t[-1]))
+        axes.set_xlim(float(t[0]), float(t[-1]))
         axes.grid(alpha=0.25)
         axes.tick_params(labelbottom=axes is rows[-1])
     rows[-1].set_xlabel("t [s]")
-    figure.align_ylabels(rows)
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a picture as PNG, its labels aligned, without the drawing library's version in it."""
+    figure.align_ylabels()
     FigureCanvasAgg(figure)
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
 

@@ -7,14 +7,13 @@ from pathlib import Path
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from controllers.flock import FlockTrajectory
 from formation.angles import FloatArray
-from hil.figures.chain_figures import DPI, LIMIT, QUIET, Colour
+from hil.figures.chain_figures import LIMIT, QUIET, Colour, save, share_time_axis
 from hil.scenario.schema import Scenario
 
 MOMENTS = 8
@@ -54,14 +53,8 @@ def draw_flock(
     for side in (scenario.controller.v_max, -scenario.controller.v_max):
         if float(trajectory.v.min()) <= 0.9 * side <= float(trajectory.v.max()):
             rows[1].axhline(side, color=LIMIT, lw=1.0, ls=":")
-    for axes in rows:
-        axes.set_xlim(float(trajectory.t[0]), float(trajectory.t[-1]))
-        axes.grid(alpha=0.25)
-        axes.tick_params(labelbottom=axes is rows[-1])
-    rows[-1].set_xlabel("t [s]")
-    figure.align_ylabels(rows)
-    FigureCanvasAgg(figure)
-    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+    share_time_axis(rows, trajectory.t)
+    save(figure, path)
 
 
 def draw_from_above(axes: Axes, trajectory: FlockTrajectory, colours: list[Colour]) -> None:
