@@ -16,6 +16,7 @@ from estimation.estimate import Estimate
 from estimation.prediction import SentCommand, predict_shape
 from estimation.tracking import Status
 from formation.pose import Motion
+from hil.nodes.leader_turn import LeaderTurn
 from hil.nodes.node import (
     Counts,
     Event,
@@ -27,7 +28,7 @@ from hil.nodes.node import (
     no_counts,
     outgoing,
 )
-from hil.scenario.parts import foresight, gains, limits
+from hil.scenario.parts import gains, limits
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -83,10 +84,8 @@ class ControllerNode:
         self.transport_ns = round(given.transport_s / _NS)
         self.ahead_ns = self.transport_ns + round(given.lag_s / _NS)
         self.tick_ns = round(1.0 / given.tick_hz / _NS)
-        self.needs_u1 = given.law == "ideal"
-        self.fades = given.law == "faded"
-        self.foresight = foresight(scenario) if given.law in ("feedforward", "faded") else None
-        leader = (self.topics.leader_cmd_vel,) if self.needs_u1 else ()
+        self.leader_turn = LeaderTurn(scenario)
+        leader = (self.topics.leader_cmd_vel,) if self.leader_turn.is_told else ()
         self.subscribes: tuple[str, ...] = (self.topics.estimate, topics.STOP, *leader)
 
     def begin(self, now_ns: int) -> ControllerState:
@@ -117,7 +116,8 @@ class ControllerNode:
             kept = estimate if fresh else state.estimate
             state = replace(state, status=estimate.status, heard=True, estimate=kept)
             if fresh:
-                state = replace(state, trend=self._trend(state, estimate, now_ns))
+                ahead = self._ahead(estimate, now_ns)
+                state = replace(state, trend=self.leader_turn.trend(state.trend, estimate, ahead))
         elif event.topic == self.topics.leader_cmd_vel:
             return self._hear_leader(state, event.payload), ()
         elif event.topic:
@@ -159,7 +159,8 @@ class ControllerNode:
             age = (now_ns - estimate.measured_ns) * _NS
             if age <= self.max_age and _can_be(estimate):
                 shape = predict_shape(estimate, state.sent, now_ns + self.ahead_ns, self.lag)
-                u1 = self._leader_turn(state, estimate, now_ns)
+                ahead = self._ahead(estimate, now_ns)
+                u1 = self.leader_turn.when_acting(state.leader_u1, state.trend, ahead)
                 wanted = self.law(shape, estimate.v1, u1, self.gains, self.limits)
             else:
                 wanted = Motion(math.nan, math.nan)
@@ -172,24 +173,6 @@ class ControllerNode:
             lost=state.status is Status.LOST,
             stopped=state.stopped,
         )
-
-    def _trend(self, state: ControllerState, estimate: Estimate, now_ns: int) -> TurnTrend | None:
-        """Trend with an estimate in it; what no sound estimator gives is not to stay in it, and ends it."""
-        variance = float(estimate.covariance[4, 4])
-        if self.foresight is None or not (abs(estimate.u1) < _LARGEST and 0.0 <= variance < _LARGEST):
-            return None
-        ahead = self._ahead(estimate, now_ns)
-        return self.foresight.heard(state.trend, estimate.capture_ns, estimate.u1, variance, ahead)
-
-    def _leader_turn(self, state: ControllerState, estimate: Estimate, now_ns: int) -> float:
-        """The leader's turn rate when a command acts, as it is told or foreseen; nan where neither is."""
-        if self.foresight is None:
-            return state.leader_u1 if self.needs_u1 else estimate.u1
-        if state.trend is None:
-            return math.nan
-        u1 = self.foresight.predicted(state.trend)
-        ahead = self._ahead(estimate, now_ns)
-        return u1 * self.foresight.weight(state.trend.variance, ahead) if self.fades else u1
 
     def _ahead(self, estimate: Estimate, now_ns: int) -> float:
         """Time [s] from the capture of an estimate to when a command of now acts."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from controllers.chain import ChainTrajectory, simulate_chain
 from controllers.feedforward import Foresight
-from controllers.laws import LAWS, Gains, independent
+from controllers.laws import LAWS, Gains
 from controllers.limits import Limits
 from controllers.side_change_run import run_with_changes
 from estimation.motion import LeaderLimits, ProcessNoise
@@ -110,5 +110,5 @@ def chain_run(scenario: Scenario, agents: int, times: FloatArray) -> ChainTrajec
         gains(scenario),
         limits(scenario),
         times,
-        knows_turn=LAWS[scenario.controller.law] is not independent,
+        knows_turn=scenario.controller.law != "independent",
     )
