@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from hil.judge.evidence import Evidence
     from hil.log.reader import Log
     from hil.replay.rerun import Replay
+    from hil.scenario.schema import Scenario
 
 
 @click.command("replay")
@@ -64,6 +65,11 @@ def command(
     if from_s is not None and to_s is not None and to_s <= from_s:
         raise UsageError(f"--to {to_s:g}: expected more than --from {from_s:g}")
     given = read_log(log)
+    if chart is None and follower is None and (chain := _chain(given, estimator, leader, overrides, table)):
+        from hil.commands.chain_results import Wishes, replay_run
+
+        replay_run(given, chain, Wishes(verify, strict, certify, as_json, from_s, to_s, out))
+        return
     played = _played(given, chart, estimator, leader, follower, overrides, verify=verify)
     evidence = evidence_of_replay(given, played, from_s, to_s)
     summary = summarise(evidence)
@@ -102,9 +108,10 @@ def _played(
 ) -> Replay:
     """Replay of one of our logs, or of another lab's by its topic map."""
     from hil.log.metadata import scenario_of
-    from hil.replay.rerun import replay, replay_foreign
+    from hil.replay.rerun import replay, replay_foreign, replay_link
     from hil.replay.topic_map import load_topic_map
     from hil.scenario.files import with_overrides
+    from hil.scenario.links import chain_of, link_of
 
     kind = [*overrides] if estimator is None else [*overrides, f"estimator.kind={estimator}"]
     if chart is not None:
@@ -114,6 +121,15 @@ def _played(
     own = scenario_of(log)
     if own is None:
         return replay(log)
+    if chain_of(own) is not None and follower is not None:
+        _refuse_leader(leader)
+        link, was = link_of(with_overrides(own, kind), follower), link_of(own, follower)
+        if verify and link != was:
+            raise UsageError(
+                "--verify compares with what was recorded, with the log's own settings; leave out what "
+                "changes them"
+            )
+        return replay_link(log, link, was)
     names = {"leader.name": leader, "follower.name": follower}
     renamed = [f"{key}={name}" for key, name in names.items() if name is not None]
     chosen = with_overrides(own, [*kind, *renamed])
@@ -124,6 +140,36 @@ def _played(
             "what changes that"
         )
     return replay(log, chosen)
+
+
+def _chain(
+    log: Log, estimator: str | None, leader: str | None, overrides: Sequence[str], table: Path | None
+) -> Scenario | None:
+    """Scenario to replay all followers of a chain by; None for the log of a pair, or of others."""
+    from hil.log.metadata import scenario_of
+    from hil.scenario.files import with_overrides
+    from hil.scenario.links import chain_of, links_of
+
+    own = scenario_of(log)
+    if own is None or chain_of(own) is None:
+        return None
+    _refuse_leader(leader)
+    if table is not None:
+        known = ", ".join(link.follower for link in links_of(own))
+        raise UsageError(
+            f"--csv {table}: a file holds the estimates of one follower; give --follower with one of "
+            f"{known}, or --out for all"
+        )
+    kind = [] if estimator is None else [f"estimator.kind={estimator}"]
+    return with_overrides(own, [*overrides, *kind])
+
+
+def _refuse_leader(leader: str | None) -> None:
+    if leader is not None:
+        raise UsageError(
+            f"--leader {leader!r}: in the log of a chain everybody follows the robot before; "
+            "leave it out, and give --follower"
+        )
 
 
 def _write(evidence: Evidence, summary: dict[str, Any], table: Path | None, out: Path | None) -> None:

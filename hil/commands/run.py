@@ -12,7 +12,7 @@ import click
 from hil.errors import CheckFailedError, UsageError
 from hil.report_json import print_json, write_json
 from hil.scenario.files import load_scenario, refuse_unrunnable
-from hil.scenario.links import refuse_chain
+from hil.scenario.links import chain_of, links_of
 from hil.scenario.schema import Scenario
 
 DURATION = click.FloatRange(min=0, min_open=True)
@@ -54,7 +54,7 @@ def command(
     options = [f"{key}={value}" for key, value in given.items() if value is not None]
     chosen = load_scenario(scenario, [*overrides, *options])
     refuse_unrunnable(chosen)
-    refuse_chain(chosen, f"abreast simulate {chosen.name} runs the chain")
+    links_of(chosen)
     folder = _folder(chosen, out)
     log_path = folder / "run.mcap"
     if log_path.exists():
@@ -143,10 +143,15 @@ def _judge(log_path: Path, folder: Path, *, certify: bool) -> dict[str, Any]:
     from hil.judge.evidence import evidence_of_log
     from hil.judge.summary import summarise
     from hil.judge.summary_text import print_summary
+    from hil.log.metadata import scenario_of
     from hil.log.reader import read_log
     from hil.reports.run_report import run_report
 
     log = read_log(log_path)
+    if (own := scenario_of(log)) is not None and chain_of(own) is not None:
+        from hil.commands.chain_results import judge_run
+
+        return judge_run(log, own, folder, certify=certify)
     evidence = evidence_of_log(log)
     summary = summarise(evidence)
     if certify:

@@ -9,15 +9,17 @@ from itertools import pairwise
 from typing import Any, TypeVar
 
 from estimation.clock import Arrival
+from hil.certificate import certificate_json, certificate_of
 from hil.errors import UsageError
 from hil.log.metadata import IMPORT, mode_of, recorded_certificate, scenario_of
 from hil.log.reader import Log, Record
 from hil.nodes.node import digest
+from hil.scenario.links import Link
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.message_types import Command, DiagnosticArray, LeaderEstimate, Message, RigidBodies, Truth
 from hil.wire.messages import MalformedPayloadError, to_ns
-from hil.wire.topics import Topics, topics_of
+from hil.wire.topics import Topics, link_topics
 
 M = TypeVar("M", bound=Message)
 
@@ -134,11 +136,21 @@ def evidence_of_log(log: Log, scenario: Scenario | None = None) -> Evidence:
     scenario = scenario or own
     if scenario is None:
         raise UsageError(f"log {log.path}: does not tell its scenario; give one, or a map that names one")
-    names = topics_of(scenario)
+    evidence = evidence_of_link(log, Link(scenario))
+    return replace(evidence, certificate=recorded_certificate(log) if scenario == own else None)
+
+
+def evidence_of_link(log: Log, link: Link) -> Evidence:
+    """Evidence of what a log recorded of one follower of a chain, or of a pair.
+
+    For a predecessor that no program drives the certificate is there: it assumes the limits alone.
+    """
+    scenario, names = link.scenario, link_topics(link)
     records = _records(log, names)
     counts = _last_counts(_decoded(log, records[topics.DIAGNOSTICS], DiagnosticArray))
+    estimator = counts.get(link.node_name("estimator"), {})
     estimates = _decoded(log, records[names.estimate], LeaderEstimate)
-    truth = _decoded(log, records[topics.TRUTH], Truth)
+    truth = _decoded(log, records[names.truth], Truth)
     arrivals = _arrivals(log, records[topics.RIGID_BODIES], estimates)
     since = counts.get("emulator", {}).get("motion_since_ns")
     evidence = Evidence(
@@ -147,14 +159,14 @@ def evidence_of_log(log: Log, scenario: Scenario | None = None) -> Evidence:
         estimates=estimates,
         commands=_decoded(log, records[names.command], Command),
         truth=truth,
-        taken=_group(counts.get("estimator", {}), "taken"),
-        refused=_group(counts.get("estimator", {}), "refused"),
+        taken=_group(estimator, "taken"),
+        refused=_group(estimator, "refused"),
         motion_since_ns=None if since is None else int(since),
         stopped_ns=records[topics.STOP][0].log_ns if records[topics.STOP] else None,
         frames=_frames(scenario, arrivals, truth),
         arrivals=arrivals,
         log=LogFacts(str(log.path), log.messages, log.path.stat().st_size),
-        certificate=recorded_certificate(log) if scenario == own else None,
+        certificate=None if link.first else certificate_json(certificate_of(scenario, driven=False)),
     )
     return replace(evidence, zero_ns=_zero_ns(log, evidence))
 
@@ -175,7 +187,7 @@ def _captures(evidence: Evidence) -> list[int]:
 def _records(log: Log, names: Topics) -> dict[str, list[Record]]:
     wanted = (
         topics.RIGID_BODIES,
-        topics.TRUTH,
+        names.truth,
         topics.DIAGNOSTICS,
         topics.STOP,
         names.estimate,

@@ -62,15 +62,20 @@ def verdict_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
             text += f", {1e3 * formation['orbit_deviation_rms']['rho']:.1f} mm RMS off the noise-free run"
         yield "formation", text, PLAIN
     yield from _wire_lines(summary)
+    yield from parity_line(summary)
+    if "log" in summary:
+        log = summary["log"]
+        yield "log", f"{log['path']} ({log['messages']} messages, {log['bytes'] / 1e6:.1f} MB)", PLAIN
+
+
+def parity_line(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """The line of the verdict on a verified replay, if it is one."""
     parity = summary.get("parity")
     if parity is not None:
         wrong = sum(part["mismatched"] for part in parity.values())
         compared = sum(part["compared"] for part in parity.values())
         verdict = f"{compared} messages compared, {wrong} differ"
         yield "replay", verdict, GOOD if compared and not wrong else BAD
-    if "log" in summary:
-        log = summary["log"]
-        yield "log", f"{log['path']} ({log['messages']} messages, {log['bytes'] / 1e6:.1f} MB)", PLAIN
 
 
 def _estimate_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:

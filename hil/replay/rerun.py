@@ -10,13 +10,15 @@ from hil.errors import UsageError
 from hil.log.events import check_inputs, logged_events, recorded_commands, recorded_estimates
 from hil.log.metadata import scenario_of
 from hil.log.reader import Log
-from hil.nodes.controller import ControllerNode, ControllerState
+from hil.nodes.controller import ControllerState
 from hil.nodes.estimator import EstimatorNode, EstimatorState
+from hil.nodes.link_nodes import controller_node, estimator_node
 from hil.nodes.node import Outgoing, digest
 from hil.replay.foreign_log import foreign_events
 from hil.replay.journal import Journey, Parity, feed, index_by_digest, parity_of, refeed
 from hil.replay.smoothing import ListeningEstimator, smoothed_estimates
 from hil.replay.topic_map import TopicMap
+from hil.scenario.links import Link, links_of
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire.messages import decode_as, typename_of
@@ -26,20 +28,25 @@ M = TypeVar("M", bound=msg.Message)
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """What came out of a replay.
+    """What came out of a replay of one follower's life.
 
     ``parity``: by ``estimates`` and ``commands``, how they compare with the recorded ones; empty where the
     log was estimated anew. ``missing_inputs``: inputs that were consumed live but are not in the log.
     ``controller``: None where there were no commands to repeat.
     """
 
-    scenario: Scenario
+    link: Link
     estimates: tuple[msg.LeaderEstimate, ...]
     commands: tuple[msg.Command, ...]
     estimator: EstimatorState
     controller: ControllerState | None = None
     parity: Mapping[str, Parity] = field(default_factory=dict)
     missing_inputs: int = 0
+
+    @property
+    def scenario(self) -> Scenario:
+        """The pair's scenario."""
+        return self.link.scenario
 
     @property
     def mismatched(self) -> int:
@@ -55,19 +62,32 @@ def replay(log: Log, scenario: Scenario | None = None) -> Replay:
     commands, as these would have moved the robot elsewhere. A log without estimates is fed in log order.
     Raises :class:`UsageError` for a log that is not ours or lacks what the estimator needs.
     """
-    own = scenario_of(log)
-    if own is None:
+    own = _own_scenario(log)
+    return replay_link(log, Link(own if scenario is None else scenario), Link(own))
+
+
+def replay_chain(log: Log, scenario: Scenario | None = None) -> tuple[Replay, ...]:
+    """The same for every follower of a chain, from the leader on, each by itself.
+
+    Raises :class:`UsageError` too if the scenario has more or fewer agents than the log.
+    """
+    own = links_of(_own_scenario(log))
+    chosen = own if scenario is None else links_of(scenario)
+    if len(chosen) != len(own):
         raise UsageError(
-            f"log {log.path}: was not made by abreast; name its topics with --map FILE "
-            f"(topics there: {', '.join(sorted(log.topics)) or 'none'})"
+            f"log {log.path}: has {len(own) + 1} agents, expected as many as chain.agents = {len(chosen) + 1}"
         )
-    chosen = own if scenario is None else scenario
+    return tuple(replay_link(log, link, was) for link, was in zip(chosen, own, strict=True))
+
+
+def replay_link(log: Log, chosen: Link, own: Link) -> Replay:
+    """Replay of one follower by a link that may differ from the log's own; see :func:`replay`."""
     if chosen != own:
-        check_inputs(log, chosen)
+        check_inputs(log, chosen.scenario)
     node = _estimator_of(chosen)
     recorded = recorded_estimates(log, node.topics.estimate)
     if not recorded:
-        check_inputs(log, chosen)
+        check_inputs(log, chosen.scenario)
         return _estimated_anew(chosen, node, feed(node, logged_events(log, node.subscribes)))
     index = index_by_digest(logged_events(log, node.subscribes))
     journey = refeed(node, node.topics.estimate, recorded, index)
@@ -82,34 +102,45 @@ def replay_foreign(log: Log, chart: TopicMap) -> Replay:
 
     Raises :class:`UsageError` as :func:`hil.replay.foreign_log.foreign_events`.
     """
-    node = _estimator_of(chart.scenario)
-    return _estimated_anew(chart.scenario, node, feed(node, foreign_events(log, chart)))
+    link = Link(chart.scenario)
+    node = _estimator_of(link)
+    return _estimated_anew(link, node, feed(node, foreign_events(log, chart)))
 
 
-def _estimator_of(scenario: Scenario) -> EstimatorNode:
-    return ListeningEstimator(scenario) if scenario.estimator.kind == "smoother" else EstimatorNode(scenario)
+def _own_scenario(log: Log) -> Scenario:
+    own = scenario_of(log)
+    if own is None:
+        raise UsageError(
+            f"log {log.path}: was not made by abreast; name its topics with --map FILE "
+            f"(topics there: {', '.join(sorted(log.topics)) or 'none'})"
+        )
+    return own
 
 
-def _estimated_anew(scenario: Scenario, node: EstimatorNode, journey: Journey[EstimatorState]) -> Replay:
+def _estimator_of(link: Link) -> EstimatorNode:
+    if link.scenario.estimator.kind == "smoother":
+        return ListeningEstimator(link.scenario, link.node_name("estimator"), link.others)
+    return estimator_node(link)
+
+
+def _estimated_anew(link: Link, node: EstimatorNode, journey: Journey[EstimatorState]) -> Replay:
     if isinstance(node, ListeningEstimator):
         estimates = tuple(smoothed_estimates(node))
     else:
         estimates = _decoded(journey.outputs, msg.LeaderEstimate)
-    return Replay(scenario, estimates, (), journey.state, missing_inputs=journey.missing)
+    return Replay(link, estimates, (), journey.state, missing_inputs=journey.missing)
 
 
-def _with_commands(
-    log: Log, scenario: Scenario, estimator: Journey[EstimatorState], estimates: Parity
-) -> Replay:
+def _with_commands(log: Log, link: Link, estimator: Journey[EstimatorState], estimates: Parity) -> Replay:
     """Repeat the controller's life too. It is fed with the estimates as logged, so it is judged by itself."""
-    node = ControllerNode(scenario)
+    node = controller_node(link)
     recorded = recorded_commands(log, node.topics.command)
     index = index_by_digest(logged_events(log, node.subscribes))
     journey = refeed(node, node.topics.command, recorded, index)
     drive = node.topics.cmd_vel
     sent = [digest(event.topic, event.payload) for event, _ in logged_events(log, [drive])]
     return Replay(
-        scenario=scenario,
+        link=link,
         estimates=_decoded(estimator.outputs, msg.LeaderEstimate),
         commands=_decoded(journey.outputs, msg.Command),
         estimator=estimator.state,

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from estimation.estimate import estimate_of
 from estimation.measurement import Measurement
 from estimation.smoother import smooth
-from hil.nodes.estimator import REASONS, EstimatorNode, EstimatorState
+from hil.nodes.estimator import NAME, REASONS, EstimatorNode, EstimatorState
 from hil.nodes.leader_filter import refuse_bias_states
 from hil.nodes.node import Event, Outgoing
 from hil.scenario.schema import Scenario
@@ -20,9 +20,10 @@ from hil.wire.message_types import LeaderEstimate
 class ListeningEstimator(EstimatorNode):
     """The EKF's node, which keeps the measurements of its whole life, by capture time, beside its state."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, name: str = NAME, others: frozenset[str] = frozenset()) -> None:
         refuse_bias_states(scenario)
-        super().__init__(replace(scenario, estimator=replace(scenario.estimator, kind="ekf")))
+        ekf = replace(scenario, estimator=replace(scenario.estimator, kind="ekf"))
+        super().__init__(ekf, name, others)
         self.measurements: dict[int, Measurement] = {}
 
     def step(

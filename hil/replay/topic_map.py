@@ -18,6 +18,7 @@ from msgspec import Struct
 from hil.errors import UsageError
 from hil.scenario.checked_toml import checked, locate, read_toml
 from hil.scenario.files import merged_scenario, with_overrides
+from hil.scenario.links import refuse_chain
 from hil.scenario.schema import NonNegative, Scenario
 
 MAPS = "maps"
@@ -90,6 +91,7 @@ def load_topic_map(
     if file.topics.rigid_bodies is not None and poses != (None, None):
         raise UsageError(f"{source}: topics: give either rigid_bodies or leader_pose and follower_pose")
     scenario = with_overrides(merged_scenario(file.scenario, path.stem, f"{source}: scenario"), overrides)
+    refuse_chain(scenario, "a map names the topics of two robots; leave out what sets chain")
     return TopicMap(
         path=path,
         topics=_without_slashes(file.topics),

@@ -7,11 +7,12 @@ from dataclasses import replace
 from typing import Any
 
 from hil.errors import UsageError
-from hil.judge.evidence import Evidence, evidence_of_log
+from hil.judge.evidence import Evidence, evidence_of_link, evidence_of_log
 from hil.log.metadata import IMPORT, mode_of
 from hil.log.reader import Log
 from hil.replay.journal import Parity
 from hil.replay.rerun import Replay
+from hil.scenario.links import Link
 from hil.wire.message_types import LeaderEstimate
 from hil.wire.messages import to_ns
 
@@ -25,7 +26,7 @@ def evidence_of_replay(
     an emulated leader set off, else from the first capture. Raises :class:`UsageError` if they leave no
     estimate.
     """
-    found = evidence_of_log(log, played.scenario)
+    found = _evidence(log, played.link)
     captures = [to_ns(estimate.header.stamp) for estimate in played.estimates]
     zero_ns = found.zero_ns
     if found.motion_since_ns is None and mode_of(log) != IMPORT:
@@ -50,6 +51,10 @@ def evidence_of_replay(
     return evidence
 
 
+def _evidence(log: Log, link: Link) -> Evidence:
+    return evidence_of_link(log, link) if link.in_chain else evidence_of_log(log, link.scenario)
+
+
 def evaluated(evidence: Evidence) -> list[LeaderEstimate]:
     """Estimates within the limits that were asked for, both ends included; all if there are none."""
     first, last = evidence.evaluate_from_ns, evidence.evaluate_to_ns
@@ -61,23 +66,28 @@ def evaluated(evidence: Evidence) -> list[LeaderEstimate]:
     ]
 
 
-def parity_json(played: Replay) -> dict[str, Any]:
-    """Counts of the comparison as the summary has them."""
+def parity_json(*played: Replay) -> dict[str, Any]:
+    """Counts of the comparison as the summary has them, over all followers that were replayed."""
     nothing = Parity(0, 0)
-    counts = {name: played.parity.get(name, nothing) for name in ("estimates", "commands")}
+    counts = {name: [each.parity.get(name, nothing) for each in played] for name in ("estimates", "commands")}
     return {
-        name: {"compared": parity.compared, "mismatched": parity.mismatched}
-        for name, parity in counts.items()
+        name: {
+            "compared": sum(parity.compared for parity in parities),
+            "mismatched": sum(parity.mismatched for parity in parities),
+        }
+        for name, parities in counts.items()
     }
 
 
 def why_not_same(log: Log, played: Replay) -> str:
     """What speaks against a replay that repeats the log bit for bit; empty if nothing does."""
+    whose = f" of {played.link.follower}" if played.link.in_chain else ""
     compared = sum(parity.compared for parity in played.parity.values())
     if not compared:
-        return f"log {log.path}: holds no estimates, so there is nothing to verify"
+        return f"log {log.path}: holds no estimates{whose}, so there is nothing to verify"
     wrong = [
-        f"{parity.mismatched} of {parity.compared} {name} differ (the first is number {parity.first + 1})"
+        f"{parity.mismatched} of {parity.compared} {name}{whose} differ "
+        f"(the first is number {parity.first + 1})"
         for name, parity in played.parity.items()
         if parity.first is not None
     ]

@@ -11,6 +11,7 @@ import tomli_w
 
 from hil.errors import UsageError
 from hil.scenario.checked_toml import checked, locate, read_toml, shipped_names
+from hil.scenario.links import refuse_chain
 from hil.scenario.schema import OFFLINE_ESTIMATORS, Scenario
 
 _FOLDER = "scenarios"
@@ -78,7 +79,9 @@ def merged_scenario(part: Mapping[str, Any], name: str, source: str) -> Scenario
     if not isinstance(base, str):
         raise UsageError(f"{source}: base is {base!r}, expected the name of a scenario or a path to one")
     tree = msgspec.to_builtins(load_scenario(base))
-    return build_scenario(_overlaid(tree, {"name": name, "description": "", **given}), source=source)
+    merged = build_scenario(_overlaid(tree, {"name": name, "description": "", **given}), source=source)
+    refuse_chain(merged, "a recording is of two robots; give base = the name of another scenario")
+    return merged
 
 
 def scenario_text(scenario: Scenario) -> str:

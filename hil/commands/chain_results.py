@@ -1,0 +1,121 @@
+"""What ``abreast run`` and ``abreast replay`` make of the log of a chain: all followers, each by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from hil.errors import CheckFailedError, UsageError
+from hil.judge.chain_pairs import driven_trajectory
+from hil.judge.chain_summary import summarise_chain
+from hil.judge.chain_text import print_chain
+from hil.judge.evidence import Evidence, evidence_of_link
+from hil.log.metadata import scenario_of
+from hil.log.reader import Log
+from hil.replay.estimate_csv import write_estimates
+from hil.replay.rerun import replay_chain
+from hil.replay.verdict import evaluated, evidence_of_replay, parity_json, violated_bounds, why_not_same
+from hil.report_json import print_json, write_json
+from hil.scenario.links import links_of
+from hil.scenario.schema import Scenario
+
+
+@dataclass(frozen=True, slots=True)
+class Wishes:
+    """What is asked of a replay besides the estimates: a comparison, strictness, where files go, a span."""
+
+    verify: bool
+    strict: bool
+    certify: bool
+    as_json: bool
+    from_s: float | None
+    to_s: float | None
+    out: Path | None
+
+
+def judge_run(log: Log, scenario: Scenario, folder: Path, *, certify: bool) -> dict[str, Any]:
+    """Judge the log of a run, and leave summary and picture beside it."""
+    evidences = [evidence_of_link(log, link) for link in links_of(scenario)]
+    summary = _summary(log, scenario, evidences, certify=certify)
+    _write(scenario, evidences, summary, folder, "run.png")
+    print_chain(summary)
+    click.echo(
+        f"a page is made of one follower at a time: abreast replay {log.path} "
+        f"--follower {evidences[-1].scenario.follower.name} --out DIR",
+        err=True,
+    )
+    return summary
+
+
+def replay_run(log: Log, chosen: Scenario, wishes: Wishes) -> None:
+    """Replay the log of a chain by a scenario, and do with the result what is wished."""
+    if wishes.verify and chosen != scenario_of(log):
+        raise UsageError(
+            "--verify compares with what was recorded, with the log's own settings; leave out what changes "
+            "them"
+        )
+    played = replay_chain(log, chosen)
+    evidences = [evidence_of_replay(log, each, wishes.from_s, wishes.to_s) for each in played]
+    summary = _summary(log, chosen, evidences, certify=wishes.certify)
+    if wishes.verify:
+        summary["parity"] = parity_json(*played)
+        for pair, each in zip(summary["pairs"], played, strict=True):
+            pair["parity"] = parity_json(each)
+    if wishes.out is not None:
+        _make(wishes.out)
+        _write(chosen, evidences, summary, wishes.out, "replay.png")
+        for evidence in evidences:
+            name = evidence.scenario.follower.name
+            write_estimates(evaluated(evidence), wishes.out / f"estimates-{name}.csv")
+    print_chain(summary)
+    if wishes.as_json:
+        print_json(summary)
+    reasons = [why_not_same(log, each) for each in played] if wishes.verify else []
+    if reason := next(filter(None, reasons), ""):
+        raise CheckFailedError(reason)
+    if wishes.strict:
+        _refuse_violated(log, summary)
+
+
+def _summary(log: Log, scenario: Scenario, evidences: Sequence[Evidence], *, certify: bool) -> dict[str, Any]:
+    summary = summarise_chain(scenario, evidences)
+    if certify:
+        from hil.judge.certified import judge_certified
+
+        for pair, evidence in zip(summary["pairs"], evidences, strict=True):
+            pair["certified"] = judge_certified(log, evidence)
+    return summary
+
+
+def _write(
+    scenario: Scenario, evidences: Sequence[Evidence], summary: dict[str, Any], folder: Path, picture: str
+) -> None:
+    write_json(summary, folder / "summary.json")
+    trajectory = driven_trajectory(evidences)
+    if trajectory is None:
+        click.echo("no picture: the log does not tell where the robots really were", err=True)
+        return
+    from hil.figures.chain_figures import draw_chain
+
+    draw_chain(scenario, trajectory, float(trajectory.t[-1]), folder / picture)
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"--out {folder}: cannot be made ({error.strerror}); give another folder") from None
+
+
+def _refuse_violated(log: Log, summary: dict[str, Any]) -> None:
+    broken = [
+        f"{pair['follower']}: {name} by {count}"
+        for pair in summary["pairs"]
+        for name, count in violated_bounds(pair).items()
+    ]
+    if broken:
+        raise CheckFailedError(f"log {log.path}: extended bounds violated (samples): {', '.join(broken)}")
