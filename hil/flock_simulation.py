@@ -14,9 +14,9 @@ from formation.angles import FloatArray, wrap
 from formation.closed_loop import IntegrationError
 from formation.flock_places import skein
 from formation.pose import Pose
-from hil.chain_simulation import SETTLED_ANGLE, SETTLED_RHO
 from hil.errors import CheckFailedError, UsageError
 from hil.figures.flock_figures import draw_flock
+from hil.judge.chain_pairs import EXACTLY
 from hil.scenario import parts as scenario_parts
 from hil.scenario.schema import FlockSection, Scenario
 from hil.track_table import write_tracks
@@ -37,9 +37,8 @@ class FlockRun:
 def simulate_flock_of(scenario: Scenario, flock: FlockSection, out: Path | None) -> dict[str, object]:
     """Run a flock and report on it; with ``out``, write ``trajectory.csv`` and ``flock.png`` there.
 
-    ``gathered_s``: when for the first time all agents are in their places (within
-    :data:`~hil.chain_simulation.SETTLED_RHO` of the spacing, headings within
-    :data:`~hil.chain_simulation.SETTLED_ANGLE` of the leader's), and ``settle_s``, from when on they stay
+    ``gathered_s``: when for the first time all agents are in their places (off by at most the share of the
+    spacing, and by the angle from the leader's heading, of :data:`~hil.judge.chain_pairs.EXACTLY`), and ``settle_s``, from when on they stay
     there to the end; absent if they don't. ``displacement_max``, ``displacement_final`` [m]: largest distance
     of an agent from its place, in the frame that turns with the leader. ``clearance_min``: least distance
     between any two agents. ``reach_max``: longest distance at which a neighbour was followed. ``changes``:
@@ -117,7 +116,7 @@ def _settled(run: FlockRun, spacing: float) -> NDArray[np.bool_]:
     """Whether all are in their places, at each sample."""
     theta = run.trajectory.poses[:, :, 2]
     turned = np.abs(wrap(theta - theta[:, :1]))
-    return np.asarray(((run.off <= SETTLED_RHO * spacing) & (turned <= SETTLED_ANGLE)).all(axis=1))
+    return np.asarray(((run.off <= EXACTLY.share * spacing) & (turned <= EXACTLY.angle)).all(axis=1))
 
 
 def _changed(trajectory: FlockTrajectory) -> NDArray[np.bool_]:
