@@ -37,14 +37,15 @@ class FlockRun:
 def simulate_flock_of(scenario: Scenario, flock: FlockSection, out: Path | None) -> dict[str, object]:
     """Run a flock and report on it; with ``out``, write ``trajectory.csv`` and ``flock.png`` there.
 
-    ``gathered_s``: when for the first time all agents are in their places (off by at most the share of the
-    spacing, and by the angle from the leader's heading, of :data:`~hil.judge.chain_pairs.EXACTLY`), and ``settle_s``, from when on they stay
-    there to the end; absent if they don't. ``displacement_max``, ``displacement_final`` [m]: largest distance
-    of an agent from its place, in the frame that turns with the leader. ``clearance_min``: least distance
-    between any two agents. ``reach_max``: longest distance at which a neighbour was followed. ``changes``:
-    how often an agent changed its neighbours, ``last_change_s`` when last. ``saturated_share``: part of the
-    time in which the law asked for more than the limit, mean over the followers. ``files``, from the leader
-    outwards: their largest displacement and the peaks of speed and turn rate.
+    ``gathered_s``: when for the first time all agents are in their places (off by at most the share of
+    the spacing, and by the angle from the leader's heading, of :data:`~hil.judge.chain_pairs.EXACTLY`),
+    and ``settle_s``, from when on they stay there to the end; absent if they don't. ``displacement_max``,
+    ``displacement_final`` [m]: largest distance of an agent from its place, in the frame that turns with
+    the leader. ``clearance_min``: least distance between any two agents. ``reach_max``: longest distance
+    at which a neighbour was followed. ``changes``: how often an agent changed its neighbours,
+    ``last_change_s`` when last. ``saturated_share``: part of the time in which the law asked for more
+    than the limit, mean over the followers. ``files``, from the leader outwards: their largest
+    displacement and the peaks of speed and turn rate.
 
     Raises :class:`CheckFailedError` if the motion breaks down.
     """
