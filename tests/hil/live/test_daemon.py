@@ -7,9 +7,13 @@ import sys
 import time
 from pathlib import Path
 
+from hil.live.daemon import NodeWorker
 from hil.log.metadata import scenario_of
 from hil.log.reader import read_log
+from hil.nodes.lockstep_run import make_nodes
+from hil.nodes.node import TICK, Event
 from hil.replay.rerun import replay
+from hil.scenario.files import load_scenario
 from hil.wire.session import free_endpoint
 
 
@@ -51,3 +55,27 @@ def test_daemons_started_by_hand_find_each_other_and_end_when_told(tmp_path: Pat
     parity = replay(log, scenario).parity
     assert parity["estimates"].compared > 100
     assert [part.mismatched for part in parity.values()] == [0, 0]
+
+
+def test_nodes_that_share_a_process_do_what_they_would_do_alone() -> None:
+    emulator, *estimators = make_nodes(load_scenario("chain5-turtlebot3", ["chain.agents=3"]))[:3]
+    together = NodeWorker(estimators)
+    alone = [NodeWorker([node]) for node in estimators]
+    world, now_ns = emulator.begin(0), 0
+    for worker in (together, *alone):
+        worker.begin(0)
+    said = [0, 0]
+    while now_ns < 500_000_000:
+        now_ns = emulator.due_ns(world)
+        world, sent = emulator.step(world, TICK, now_ns)
+        events = [TICK, *(Event(message.topic, message.payload) for message in sent)]
+        for event in events:
+            each = [
+                worker.take(event, now_ns) if event.topic in worker.subscribes or not event.topic else ()
+                for worker in alone
+            ]
+            assert together.take(event, now_ns) == tuple(message for out in each for message in out)
+            said = [count + len(out) for count, out in zip(said, each, strict=True)]
+    assert min(said) > 50
+    assert together.due_ns() == min(worker.due_ns() for worker in alone)
+    assert len(together.end(now_ns)) == 2

@@ -73,7 +73,7 @@ class Run:
 def start(tmp_path: Path) -> Iterator[Callable[..., Run]]:
     runs: list[Run] = []
 
-    def begin(*options: str, duration: float = 4.0) -> Run:
+    def begin(*options: str, duration: float = 4.0, scenario: str = "turtlebot3") -> Run:
         folder, endpoint = tmp_path / f"run{len(runs)}", free_endpoint()
         arguments = [
             "--out",
@@ -86,7 +86,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Run]]:
             *options,
         ]
         process = subprocess.Popen(
-            [sys.executable, "-m", "hil", "run", "turtlebot3", *arguments, *options],
+            [sys.executable, "-m", "hil", "run", scenario, *arguments, *options],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -156,6 +156,37 @@ def test_a_killed_estimator_stops_the_robots_and_fails_the_run(start: Callable[.
     for record in read_log(run.log).records(topics=[topics.TRUTH], start_ns=round((killed_at + 0.3) * 1e9)):
         moving = decode_as(record.payload, msg.Truth)
         assert max(abs(moving.v1), abs(moving.v2)) < 0.025
+
+
+def test_a_killed_estimator_stops_every_follower_of_a_chain(start: Callable[..., Run]) -> None:
+    run = start("--set", "chain.agents=3", duration=30.0, scenario="chain5-turtlebot3")
+    run.wait_until(driving(run))
+    time.sleep(0.5)
+    assert sorted(run.daemons()) == ["controller", "emulator", "estimator", "recorder"]
+    killed_at = time.time()
+    os.kill(run.daemons()["estimator"], signal.SIGKILL)
+    code, summary, err = run.finish()
+    assert code == 1
+    assert "the estimator was killed by signal 9" in err
+    assert run.daemons() == {}
+    assert [pair["follower"] for pair in summary["pairs"]] == ["follower", "agent3"]
+    for name in ("follower", "agent3"):
+        before, late = commands_around(run.log, killed_at, f"{name}/command")
+        assert any(sent.v2 > 0.02 for sent in before)
+        assert late
+        assert all(sent.v2 == sent.u2 == 0.0 and sent.stop for sent in late)
+        last = list(read_log(run.log).records(topics=[f"{name}/truth"]))[-1]
+        moving = decode_as(last.payload, msg.Truth)
+        assert max(abs(moving.v1), abs(moving.v2)) < 0.025
+
+
+def commands_around(log: Path, moment: float, topic: str) -> tuple[list[msg.Command], list[msg.Command]]:
+    """Commands before a moment, and from 0.3 s after it on."""
+    told = [
+        (record.log_ns * 1e-9, decode_as(record.payload, msg.Command))
+        for record in read_log(log).records([topic])
+    ]
+    return [sent for at, sent in told if at < moment], [sent for at, sent in told if at > moment + 0.3]
 
 
 def test_without_a_controller_somebody_else_stops_the_robot(start: Callable[..., Run]) -> None:
