@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from hil.errors import CheckFailedError, UsageError
-from hil.report_json import print_json, write_json
+from hil.report_json import print_json
 from hil.scenario.files import load_scenario, refuse_unrunnable
 from hil.scenario.links import chain_of, links_of
 from hil.scenario.schema import Scenario
@@ -137,30 +137,17 @@ def _make_whole(log_path: Path) -> None:
 
 
 def _judge(log_path: Path, folder: Path, *, certify: bool) -> dict[str, Any]:
-    """Judge the log, and leave summary, picture and report beside it."""
-    from hil.figures.run_figures import draw_run
-    from hil.figures.shown import Shown
-    from hil.judge.evidence import evidence_of_log
-    from hil.judge.summary import summarise
+    """Judge the log, leave summary, picture and report beside it, and print the verdict."""
     from hil.judge.summary_text import print_summary
+    from hil.judged_log import judge_log
     from hil.log.metadata import scenario_of
     from hil.log.reader import read_log
-    from hil.reports.run_report import run_report
 
     log = read_log(log_path)
     if (own := scenario_of(log)) is not None and chain_of(own) is not None:
         from hil.commands.chain_results import judge_run
 
         return judge_run(log, own, folder, certify=certify)
-    evidence = evidence_of_log(log)
-    summary = summarise(evidence)
-    if certify:
-        from hil.judge.certified import judge_certified
-
-        summary["certified"] = judge_certified(log, evidence)
-    write_json(summary, folder / "summary.json")
-    shown = Shown.of(evidence)
-    draw_run(shown, summary, folder / "run.png")
-    (folder / "report.html").write_text(run_report(shown, summary), encoding="utf-8")
+    summary = judge_log(log, folder, certify=certify)
     print_summary(summary)
     return summary

@@ -12,7 +12,7 @@ import click
 
 from hil.errors import UsageError
 from hil.report_json import print_json
-from hil.sweep.spec import Sweep, load_sweep, run_seed
+from hil.sweep.spec import Sweep, load_sweep
 
 
 @click.command("sweep")
@@ -27,7 +27,13 @@ from hil.sweep.spec import Sweep, load_sweep, run_seed
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Dask scheduler to send the work to, like tcp://host:8786."
 )
-@click.option("--keep", "kept", multiple=True, metavar="CELL:RUN", help="Also write this run as a full log.")
+@click.option(
+    "--keep",
+    "kept",
+    multiple=True,
+    metavar="CELL:RUN",
+    help="Also write this run as a full log with its report; 'worst': that of each estimator.",
+)
 @click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Folder for results."
 )
@@ -48,13 +54,20 @@ def command(
 
     Given the same --out again, a sweep that was interrupted goes on. Cells and runs count from 0.
     """
+    from hil.sweep.kept_runs import keep_run, worst_runs
+    from hil.sweep.results import write_results
+
     names = None if estimators is None else [name.strip() for name in estimators.split(",")]
     sweep = load_sweep(spec, runs=runs, seed=seed, duration_s=duration, estimators=names)
-    to_keep = [_parsed(sweep, text) for text in kept]
+    to_keep = [_parsed(sweep, text) for text in kept if text != "worst"]
     folder = out or Path("runs") / f"sweep-{time.strftime('%Y%m%d-%H%M%S')}"
     result = _fly(sweep, folder, workers or len(os.sched_getaffinity(0)), scheduler)
+    if "worst" in kept:
+        to_keep += worst_runs(result)
     for cell, run in to_keep:
-        _keep(sweep, folder, cell, run)
+        click.echo(f"kept {keep_run(sweep, folder, cell, run)}", err=True)
+    write_results(sweep, result, folder)
+    click.echo(f"results in {folder}, look at {folder / 'report.html'}", err=True)
     if as_json:
         print_json(result)
 
@@ -86,11 +99,11 @@ def _fly(sweep: Sweep, folder: Path, workers: int, scheduler: str | None) -> dic
             scheduler=scheduler,
             progress=lambda done: bar.update(task, completed=done),
         )
-    _say(console, result, folder)
+    _say(console, result)
     return result
 
 
-def _say(console: Any, result: dict[str, Any], folder: Path) -> None:
+def _say(console: Any, result: dict[str, Any]) -> None:
     cells = result["cells"]
     violations: dict[str, int] = {}
     for cell in cells:
@@ -101,13 +114,3 @@ def _say(console: Any, result: dict[str, Any], folder: Path) -> None:
     console.print(f"{len(cells)} cells, {samples} samples, {diverged} runs diverged")
     console.print("outside their bounds: " + ", ".join(f"{name} {n}" for name, n in violations.items()))
     console.print(f"{result['run_seconds']:.0f} s of runs in {result['wall_s']:.1f} s ({speed:.0f} to 1)")
-    console.print(f"results in {folder}", soft_wrap=True)
-
-
-def _keep(sweep: Sweep, folder: Path, cell: int, run: int) -> None:
-    """Write a run of the sweep as the log of a lockstep run with its seed."""
-    from hil.nodes.lockstep_run import run_lockstep
-
-    path = folder / f"run-{cell}-{run}.mcap"
-    run_lockstep(sweep.scenario_of(sweep.cells()[cell], run_seed(sweep.spec.seed, run)), path)
-    click.echo(f"kept {path}", err=True)

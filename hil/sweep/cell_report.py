@@ -21,7 +21,8 @@ def report_cell(cell: Cell, tallies: NDArray[np.void], allowed: tuple[float, flo
     ``rmse`` and ``coverage_3sigma`` over all samples of all runs, those of diverged runs too. ``efficiency``:
     RMSE over the root mean square of the posterior Cramer-Rao bound. ``tightness``: the largest of all runs.
     ``formation.deviation``: RMS off the noise-free run. ``formation.certified``: share of moments at which
-    the distance was in the certificate's set; absent where it has none.
+    the distance was in the certificate's set; absent where it has none. ``worst_run``: the one that came
+    nearest to its extended bounds, among those that diverged if there are any.
     """
     samples = int(tallies["samples"].sum())
     squares, best = _total(tallies["squares"]), _total(tallies["best_sum"])
@@ -37,6 +38,7 @@ def report_cell(cell: Cell, tallies: NDArray[np.void], allowed: tuple[float, flo
             "samples": samples,
             "untracked": int(tallies["untracked"].sum()),
             "diverged": int(tallies["diverged"].sum()),
+            "worst_run": _worst(tallies),
             "rmse": rmse,
             "efficiency": {name: rmse[name] / least[name] for name in rmse if least[name] > 0.0},
             "coverage_3sigma": {
@@ -60,6 +62,12 @@ def report_cell(cell: Cell, tallies: NDArray[np.void], allowed: tuple[float, flo
         }
     )
     return result
+
+
+def _worst(tallies: NDArray[np.void]) -> int:
+    extended = [n for n, name in enumerate(BOUNDS) if name.endswith("_extended")]
+    nearest = np.nan_to_num(tallies["tightness"][:, extended].max(axis=1))
+    return int(np.lexsort((nearest, tallies["diverged"]))[-1])
 
 
 def _total(columns: NDArray[Any]) -> list[float]:

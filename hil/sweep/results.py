@@ -1,4 +1,4 @@
-"""The results of a sweep: flown or gone on with, and written as JSON and as a Parquet table."""
+"""The results of a sweep: flown or gone on with, and written as JSON, as a Parquet table and as a report."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from hil.report_json import write_json
 from hil.sweep.cell_report import report_cell
+from hil.sweep.kept_runs import kept_runs
 from hil.sweep.spec import Sweep, spec_json
 from hil.sweep.work import Store, allowed_distances, pieces_of
 from hil.sweep.workers import fly_here, fly_on_cluster
@@ -22,7 +23,7 @@ Progress = Callable[[int], None]
 def fly_sweep(
     sweep: Sweep, folder: Path, *, workers: int = 1, scheduler: str | None = None, progress: Progress
 ) -> dict[str, Any]:
-    """JSON of a sweep, after doing what of it is not in the folder yet; ``results.*`` are written there.
+    """JSON of a sweep, after doing what of it is not in the folder yet.
 
     ``run_seconds`` and ``wall_s`` are of this call.
     """
@@ -45,14 +46,23 @@ def fly_sweep(
     for cell in sweep.cells():
         tallies = np.concatenate([found[piece] for piece in pieces if piece.cell == cell])
         cells.append(report_cell(cell, tallies, allowed))
-    result = {
+    return {
         "cells": cells,
         "run_seconds": (done - before) * sweep.spec.duration_s,
         "wall_s": time.perf_counter() - begun,
     }
+
+
+def write_results(sweep: Sweep, result: dict[str, Any], folder: Path) -> None:
+    """Write ``results.json``, ``results.parquet`` and ``report.html``; cells tell of their ``kept`` runs."""
+    from hil.reports.sweep_report import sweep_report
+
+    write_table(result["cells"], folder / "results.parquet")
+    for cell, kept in zip(result["cells"], kept_runs(sweep, folder), strict=True):
+        if kept:
+            cell["kept"] = kept
     write_json({"spec": spec_json(sweep.spec), **result}, folder / "results.json")
-    write_table(cells, folder / "results.parquet")
-    return result
+    (folder / "report.html").write_text(sweep_report(result), encoding="utf-8")
 
 
 def write_table(cells: list[dict[str, Any]], path: Path) -> None:

@@ -18,7 +18,8 @@ from hil.judge.evidence import evidence_of_log
 from hil.judge.summary import summarise
 from hil.log.reader import read_log
 from hil.nodes.lockstep_run import run_lockstep
-from hil.sweep.results import fly_sweep
+from hil.sweep.kept_runs import keep_run, worst_runs
+from hil.sweep.results import fly_sweep, write_results
 from hil.sweep.spec import Sweep, run_seed
 from hil.sweep.work import Piece, Store, pieces_of
 from hil.sweep.workers import fly_here, fly_on_cluster
@@ -46,7 +47,9 @@ HOLD = ("v1", "alpha1", "h", "v1_extended", "alpha1_extended", "h_extended")
 
 
 def flown(sweep: Sweep, folder: Path, **options: Any) -> dict[str, Any]:
-    return fly_sweep(sweep, folder, progress=lambda done: None, **options)
+    result = fly_sweep(sweep, folder, progress=lambda done: None, **options)
+    write_results(sweep, result, folder)
+    return result
 
 
 def test_a_cell_of_one_run_has_the_figures_of_its_lockstep_run(
@@ -162,3 +165,24 @@ def test_without_dask_the_error_says_what_to_install(
     sweep = make_sweep()
     with pytest.raises(UsageError, match=r"abreast\[cluster\]"):
         list(fly_on_cluster(sweep, list(pieces_of(sweep)), "tcp://127.0.0.1:1"))
+
+
+def test_the_worst_run_is_kept_and_linked_from_the_report(
+    make_sweep: Callable[..., Sweep], tmp_path: Path
+) -> None:
+    sweep, folder = make_sweep(), tmp_path / "out"
+    result = flown(sweep, folder)
+    (cell, run), *others = worst_runs(result)
+    assert [result["cells"][number]["estimator"] for number, _ in ((cell, run), *others)] == [
+        "ekf",
+        "difference",
+    ]
+    told = result["cells"][cell]["bounds"]["tightness"]
+    kept = keep_run(sweep, folder, cell, run)
+    summary = json.loads((kept / "summary.json").read_text())
+    nearest = {name: each for name, each in told.items() if name.endswith("_extended")}
+    name = max(nearest, key=lambda each: nearest[each])
+    assert summary["bounds"]["tightness"][name] == pytest.approx(told[name], rel=1e-6)
+    write_results(sweep, result, folder)
+    assert f"{kept.name}/report.html" in (folder / "report.html").read_text()
+    assert json.loads((folder / "results.json").read_text())["cells"][cell]["kept"] == {str(run): kept.name}
