@@ -1,4 +1,7 @@
-"""What a person reads of a chain at the end of a run or a replay: a line for each follower."""
+"""What a person reads of a chain at the end of a run or a replay: a line for each follower.
+
+The last column is the latency from the capture of a frame to the command that rests on it.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from rich.text import Text
 
 from hil.judge.summary_text import BAD, GOOD, PLAIN, extended_violations, parity_line, warnings_of
 
-_COLUMNS = ("follower", "rho [m]", "settled", "RMSE v1, alpha1", "bounds", "latency p50, p99")
+_COLUMNS = ("follower", "rho [m]", "settled", "v1 RMSE", "alpha1", "bounds", "p50, p99")
 
 
 def print_chain(summary: Mapping[str, Any], console: Console | None = None) -> None:
@@ -55,12 +58,10 @@ def _cells(pair: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield (f"{pair['rho_min']:.3f} to {pair['rho_max']:.3f}" if "rho_min" in pair else ""), PLAIN
     yield (f"from {pair['settle_s']:.1f} s" if "settle_s" in pair else "no" if formation else ""), PLAIN
     rmse = pair["estimation"].get("rmse", {})
-    if "v1" in rmse and "alpha1" in rmse:
-        yield f"{1e3 * rmse['v1']:.1f} mm/s, {math.degrees(rmse['alpha1']):.2f} deg", PLAIN
-    else:
-        yield "", PLAIN
+    yield (f"{1e3 * rmse['v1']:.1f} mm/s" if "v1" in rmse else ""), PLAIN
+    yield (f"{math.degrees(rmse['alpha1']):.2f} deg" if "alpha1" in rmse else ""), PLAIN
     broken = sum(extended_violations(pair).values())
     known = "violations" in pair["bounds"]
-    yield (f"violated {broken} times" if broken else "kept" if known else ""), BAD if broken else GOOD
+    yield (f"{broken} broken" if broken else "kept" if known else ""), BAD if broken else GOOD
     latency = pair.get("latency_ms", {}).get("capture_to_command")
-    yield (f"{latency['p50']:.1f}, {latency['p99']:.1f} ms" if latency else ""), PLAIN
+    yield (f"{latency['p50']:.0f}, {latency['p99']:.0f} ms" if latency else ""), PLAIN

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -71,7 +72,7 @@ def read_frame(
     missing_leader, missing_follower, duplicate_body, not_finite, out_of_range, bad_quaternion, tilted (z is
     not up).
     """
-    message = _decode(payload, msg.RigidBodies)
+    message = _decode_frame(payload)
     capture_ns = _stamp(message.header, now_ns)
     bodies: dict[str, msg.RigidBody] = {}
     strangers = 0
@@ -122,6 +123,12 @@ def _decode(payload: bytes, kind: type[M]) -> M:
         return decode_as(payload, kind)
     except MalformedPayloadError:
         raise RefusedError("malformed") from None
+
+
+@functools.lru_cache(maxsize=1)
+def _decode_frame(payload: bytes) -> msg.RigidBodies:
+    """A frame, decoded once for all followers that share a process. Nobody may change it."""
+    return _decode(payload, msg.RigidBodies)
 
 
 def _stamp(header: msg.Header, now_ns: int | None) -> int:
