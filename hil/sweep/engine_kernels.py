@@ -38,7 +38,6 @@ SLOTS = 64
 
 _NS = 1e-9
 _NEVER = 2**62
-_START_TIMEOUT_NS = 10_000_000_000
 _ESTIMATOR_TICK_NS = 50_000_000
 _REPORT_NS = 500_000_000
 _SMALL = 0.125
@@ -62,7 +61,7 @@ def _fields(stamps: str, numbers: str) -> np.dtype[np.void]:
 
 RULES = _fields(
     # Emulator, estimator, controller; times count from where the emulator begins.
-    "latency_ns duration_ns after_ns program "
+    "patience_ns latency_ns duration_ns after_ns program "
     "kind reacquire_frames from_ns "
     "law tick_ns transport_ns ahead_ns max_age_ns",
     "lag v_max u_max v_resolution u_resolution sigma_position sigma_heading static_fraction "
@@ -1180,12 +1179,13 @@ def _stop(run: Record, now_ns: int) -> None:
 def fly(runs: Records) -> bool:
     """The one run in ``runs`` from the start barrier to ``after_ns`` past the stop.
 
-    False if the leader never sets off. The robots stand at their start poses, and the loop's fields are all
-    zero, except that ``since_ns`` and ``published_ns`` are -1 and ``leader_u1`` is nan.
+    False if the leader does not set off within ``patience_ns``. The robots stand at their start poses, and
+    the loop's fields are all zero, except that ``since_ns`` and ``published_ns`` are -1 and ``leader_u1`` is
+    nan.
     """
     run = runs[0]
     loop, rules = run.loop, run.rules
-    end_ns = _START_TIMEOUT_NS
+    end_ns = rules.patience_ns
     while True:
         due_ns = min(_frame(run.frames, loop.frames).at_ns, _sample(run.samples, loop.odometry).at_ns)
         due_ns = min(due_ns, _release_ns(loop, run.frames, rules.latency_ns))
