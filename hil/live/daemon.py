@@ -147,9 +147,11 @@ def run_daemon(
         while not ending.asked and (until is None or time.monotonic() < until):
             wait = min((worker.due_ns() - time.time_ns()) * 1e-9, _LONGEST_WAIT)
             event = wire.inbox.take(wait)
-            now_ns = time.time_ns()
-            if event is not None or now_ns >= worker.due_ns():
-                _publish(wire, worker.take(event or TICK, now_ns))
+            if event is not None:
+                _publish(wire, worker.take(event, time.time_ns()))
+            # Also while arrivals are waiting: who is flooded must not fall silent.
+            if (now_ns := time.time_ns()) >= worker.due_ns():
+                _publish(wire, worker.take(TICK, now_ns))
         _publish(wire, worker.end(time.time_ns()))
         time.sleep(_LINGER)
         return wire.inbox.dropped
