@@ -19,6 +19,8 @@ NIS_RANGE = (1.0, 3.0)
 LEAST_KEPT = 0.9
 """Assumed errors are three standard deviations of several inputs; below this share they were too small."""
 LOST_SHARE = 0.01
+GATED_SHARE, GATED_AT_ONCE = 0.005, 5
+"""Where a leader brakes hard, as at the stop that ends a run, the gate turns a few frames away."""
 SATURATED_SHARE = 0.5
 STOPPED_SHARE = 0.02
 OFF_SHARE = 0.25
@@ -193,6 +195,7 @@ def _wire_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
         times = "once" if clock["jumps"] == 1 else f"{clock['jumps']} times"
         yield f"the clock of the motion capture jumped {times}"
     rejected = summary.get("rejected", {})
-    if rejected:
+    expected = max(GATED_AT_ONCE, GATED_SHARE * frames.get("received", 0))
+    if set(rejected) - {"gated"} or rejected.get("gated", 0) > expected:
         causes = ", ".join(f"{cause.replace('_', ' ')} {count}" for cause, count in sorted(rejected.items()))
         yield f"inputs refused: {causes}"

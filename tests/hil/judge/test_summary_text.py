@@ -52,6 +52,7 @@ def test_a_good_run_is_told_without_warnings(summary: dict[str, Any]) -> None:
         ),
         ("formation", {"orbit_deviation_rms": {"rho": 0.3}}, "the distance is 0.3 m RMS off"),
         ("rejected", {"not_finite": 3, "gated": 1}, "inputs refused: gated 1, not finite 3"),
+        ("rejected", {"gated": 6}, "inputs refused: gated 6"),
     ],
 )
 def test_what_deserves_a_second_look_is_said(
@@ -61,6 +62,10 @@ def test_what_deserves_a_second_look_is_said(
     (warning,) = warnings_of(summary)
     assert said in warning
     assert f"! {warning}" in printed(summary)
+
+
+def test_frames_gated_while_the_leader_brakes_are_no_news(summary: dict[str, Any]) -> None:
+    assert warnings_of(summary | {"rejected": {"gated": 4}}) == []
 
 
 def test_a_replay_tells_its_parity(summary: dict[str, Any]) -> None:
