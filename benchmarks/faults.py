@@ -162,7 +162,7 @@ def inject(
         if shown is None:
             continue
         last = shown
-        motion = follower_motion(moment.history, capture_ns, node.trust)
+        motion = follower_motion(moment.history, capture_ns, node.source.trust)
         measure = measure_world if node.front_end is FrontEnd.WORLD else measure_body_from_mocap
         leader = (shown.leader.x, shown.leader.y)
         track, verdict = node.tracker.add(

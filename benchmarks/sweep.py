@@ -50,6 +50,7 @@ def messages_as_objects() -> Iterator[None]:
     with (
         patch.object(nodes, "encode", same),
         patch.object(intake, "decode_as", same),
+        patch.object(intake, "_decode_frame", same),
         patch.object(drive_message, "decode", same),
         patch.object(controller, "decode_as", same),
         patch.object(emulator, "decode_as", same),

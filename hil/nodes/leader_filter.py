@@ -1,4 +1,4 @@
-"""The filter that a scenario asks for, and what it knows of its sensor."""
+"""The tracker and the filter that a scenario asks for, and what the filter knows of its sensor."""
 
 from __future__ import annotations
 
@@ -6,13 +6,30 @@ import math
 
 from estimation.belief import Belief, Model
 from estimation.estimator import Estimator
-from estimation.estimators import make_estimator
+from estimation.estimators import make_estimator, settling
 from estimation.measurement import FrontEnd
 from estimation.memory import SensorOffsets
 from estimation.motion import LeaderLimits, ProcessNoise
 from estimation.own_motion import ODOMETRY_CORRELATION, TRACK_CORRELATION
+from estimation.tracking import Tracker, TrackSettings
 from hil.errors import UsageError
 from hil.scenario.schema import Scenario
+
+
+def leader_tracker(scenario: Scenario) -> Tracker:
+    """Tracker of a scenario. Raises :class:`UsageError` like :func:`leader_filter`."""
+    given = scenario.estimator
+    settled, unsettled = settling(given.kind)
+    settings = TrackSettings(
+        gate_probability=given.gate_probability,
+        reacquire_frames=given.reacquire_frames,
+        coast_after=given.coast_after_s,
+        lost_after=given.lost_after_s,
+        window=given.window_s,
+        settled_heading=settled,
+        unsettled_heading=unsettled,
+    )
+    return Tracker(leader_filter(scenario), settings)
 
 
 def leader_filter(scenario: Scenario) -> Estimator:

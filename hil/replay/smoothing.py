@@ -9,9 +9,10 @@ from msgspec.structs import replace
 from estimation.estimate import estimate_of
 from estimation.measurement import Measurement
 from estimation.smoother import smooth
-from hil.nodes.estimator import NAME, REASONS, EstimatorNode, EstimatorState
+from hil.nodes.estimator import NAME, EstimatorNode, EstimatorState
 from hil.nodes.leader_filter import refuse_bias_states
 from hil.nodes.node import Event, Outgoing
+from hil.nodes.status_reasons import REASONS
 from hil.scenario.schema import Scenario
 from hil.wire.estimate_message import to_message
 from hil.wire.message_types import LeaderEstimate
