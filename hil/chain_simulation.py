@@ -14,6 +14,7 @@ from hil.errors import CheckFailedError, UsageError
 from hil.figures.chain_figures import draw_chain
 from hil.judge.chain_pairs import EXACTLY, pair_figures, settling_times
 from hil.scenario import parts as scenario_parts
+from hil.scenario.noise_free_runs import chain_run
 from hil.scenario.schema import Scenario
 from hil.track_table import write_tracks
 
@@ -37,7 +38,7 @@ def simulate_chain_of(scenario: Scenario, agents: int, out: Path | None) -> dict
     step = max(SAMPLE_STEP, duration * 12 * agents / MOST_CELLS)
     times = np.linspace(0.0, duration, max(2, round(duration / step) + 1))
     try:
-        trajectory = scenario_parts.chain_run(scenario, agents, times)
+        trajectory = chain_run(scenario, agents, times)
     except IntegrationError as error:
         raise CheckFailedError(f"scenario {scenario.name}: {error}; check gains and start poses") from error
     settled = settling_times(trajectory, scenario.formation.rho_0, scenario_parts.station(scenario), EXACTLY)

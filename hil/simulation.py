@@ -14,6 +14,7 @@ from formation.spacing import lyapunov
 from hil.errors import CheckFailedError, UsageError
 from hil.figures.simulation_figures import draw_experiment, draw_simulation
 from hil.scenario import parts as scenario_parts
+from hil.scenario.noise_free_runs import follower_law, noise_free_run
 from hil.scenario.schema import Scenario
 from hil.stability import PROVED_V1, stability_json, stability_of, write_stability
 
@@ -39,10 +40,10 @@ def simulate(scenario: Scenario, out: Path | None, *, stability: bool = False) -
     ``experiment.png`` (like its Fig. 3). Raises :class:`CheckFailedError` if the motion breaks down.
     """
     try:
-        trajectory = scenario_parts.noise_free_run(scenario, _sample_times(scenario.run.duration_s))
+        trajectory = noise_free_run(scenario, _sample_times(scenario.run.duration_s))
     except IntegrationError as error:
         raise CheckFailedError(f"scenario {scenario.name}: {error}; check gains and start poses") from error
-    program, law = scenario_parts.leader_program(scenario), scenario_parts.follower_law(scenario)
+    program, law = scenario_parts.leader_program(scenario), follower_law(scenario)
     changes = scenario.formation.change_sides_at_s
     orbit = (
         None

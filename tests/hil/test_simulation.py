@@ -13,7 +13,7 @@ import pytest
 
 from hil.errors import CheckFailedError, UsageError
 from hil.scenario.files import load_scenario, refuse_unrunnable
-from hil.scenario.parts import noise_free_run
+from hil.scenario.noise_free_runs import noise_free_run
 from hil.simulation import simulate
 
 DEGREE = math.pi / 180.0

@@ -19,7 +19,7 @@ from hil import stability
 from hil.errors import UsageError
 from hil.report_json import as_json
 from hil.scenario.files import load_scenario
-from hil.scenario.parts import noise_free_run
+from hil.scenario.noise_free_runs import noise_free_run
 from hil.simulation import simulate
 
 

@@ -23,7 +23,7 @@ from hil.figures.simulation_figures import (
     draw_turn_rate,
 )
 from hil.scenario.files import load_scenario
-from hil.scenario.parts import noise_free_run
+from hil.scenario.noise_free_runs import noise_free_run
 from hil.scenario.schema import Scenario
 
 

@@ -14,7 +14,8 @@ from hil.judge.evidence import Span
 from hil.judge.noise_free_orbit import noise_free_orbit
 from hil.judge.true_states import TrueStates
 from hil.scenario.files import load_scenario
-from hil.scenario.parts import gains, leader_program, limits, noise_free_run
+from hil.scenario.noise_free_runs import noise_free_run
+from hil.scenario.parts import gains, leader_program, limits
 from hil.scenario.start import start_poses
 
 T0 = 1_700_000_000_000_000_000

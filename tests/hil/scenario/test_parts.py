@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 
 from controllers.laws import Gains
@@ -42,9 +41,3 @@ def test_a_table_that_runs_backwards_is_named() -> None:
     scenario = load_scenario("turtlebot3", [f"leader.program={table}"])
     with pytest.raises(UsageError, match=r"turtlebot3: leader\.program: .*t\[1\] = 0\.5 after 1\.0"):
         scenario_parts.leader_program(scenario)
-
-
-def test_noise_free_run_starts_at_the_start_poses() -> None:
-    run = scenario_parts.noise_free_run(load_scenario("turtlebot3"), np.linspace(0.0, 1.0, 3))
-    assert run.leader[0].tolist() == [0.287, 0.005, 1.553]
-    assert run.follower[0].tolist() == pytest.approx([0.767, 0.685, -1.574], abs=1e-12)
