@@ -133,6 +133,7 @@ def eventful(exact_evidence: Evidence) -> str:
     evidence = replace(exact_evidence, scenario=named, estimates=estimates, commands=commands)
     certificate = {"h": {"sound": 0.25, "assumes": ["calm", "order"]}, "k_u_star": {"why": "<too fast>"}}
     summary = summarise(evidence) | {"certificate": certificate, "weather": {"wind": [0.5, 0.25]}}
+    summary["rejected"] = {"gated": 1, "swapped": 2}
     return run_report(Shown.of(evidence), summary)
 
 
@@ -140,7 +141,7 @@ def test_the_head_says_what_was_run_and_how_it_went(eventful: str) -> None:
     assert f"{EVIL} · ekf · seed 1 · lockstep" in words(eventful)
     assert "✗ extended ones violated" in words(eventful)
     assert 'class="verdict bad"' in eventful
-    assert "inputs refused: gated 1" in words(eventful)
+    assert "inputs refused: gated 1, swapped 2" in words(eventful)
 
 
 def test_violations_are_told_and_marked(eventful: str) -> None:
