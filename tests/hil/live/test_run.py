@@ -19,6 +19,7 @@ from formation.pose import Pose
 from hil.emulator.lab_messages import frame_message
 from hil.errors import UsageError
 from hil.log.reader import read_log
+from hil.log.recovery import recover
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.messages import decode_as, encode, header
@@ -109,6 +110,27 @@ def driving(run: Run) -> Callable[[], bool]:
     return lambda: run.logged_bytes() > 150_000
 
 
+def all_driving(run: Run, *followers: str) -> Callable[[], bool]:
+    """True once what is logged so far has every one of the followers driving."""
+
+    def check() -> bool:
+        if not driving(run)():
+            return False
+        so_far = run.log.with_name("so_far.mcap")
+        so_far.unlink(missing_ok=True)
+        recover(run.log, so_far)
+        log = read_log(so_far)
+        return all(
+            any(
+                decode_as(record.payload, msg.Command).v2 > 0.02
+                for record in log.records([f"{name}/command"])
+            )
+            for name in followers
+        )
+
+    return check
+
+
 def stamps(log: Path, topic: str) -> list[float]:
     return [record.log_ns * 1e-9 for record in read_log(log).records(topics=[topic])]
 
@@ -160,8 +182,7 @@ def test_a_killed_estimator_stops_the_robots_and_fails_the_run(start: Callable[.
 
 def test_a_killed_estimator_stops_every_follower_of_a_chain(start: Callable[..., Run]) -> None:
     run = start("--set", "chain.agents=3", duration=30.0, scenario="chain5-turtlebot3")
-    run.wait_until(driving(run))
-    time.sleep(0.5)
+    run.wait_until(all_driving(run, "follower", "agent3"))
     assert sorted(run.daemons()) == ["controller", "emulator", "estimator", "recorder"]
     killed_at = time.time()
     os.kill(run.daemons()["estimator"], signal.SIGKILL)
