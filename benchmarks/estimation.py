@@ -29,7 +29,8 @@ from estimation.estimator import Estimator
 from estimation.estimators import ESTIMATORS, make_estimator
 from estimation.inputs import mean_motion
 from estimation.measurement import FrontEnd, Measurement, PoseNoise, measure_world
-from estimation.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise, process_noise, propagate
+from estimation.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise
+from estimation.random_leaders import random_leader
 from estimation.smoother import smooth
 from estimation.tracking import Status, Tracker, TrackSettings
 from formation.angles import wrap
@@ -76,22 +77,17 @@ class Run:
     judged: list[int]
 
 
-def random_leader(generator: np.random.Generator, steps: int) -> Matrix:
+def drawn_leader(generator: np.random.Generator, steps: int) -> Matrix:
     """States (steps, 5) of a leader that moves as the model's own process noise says."""
     heading, speed = generator.uniform(-math.pi, math.pi), generator.uniform(0.5, 1.0) * LIMITS.k_v
     turn = generator.uniform(-LIMITS.k_u, LIMITS.k_u)
     state = np.array([0.0, 0.0, speed * math.cos(heading), speed * math.sin(heading), turn])
-    states = [state]
-    for _ in range(steps - 1):
-        shock = np.linalg.cholesky(process_noise(state, DT, MODEL.noise)) @ generator.standard_normal(5)
-        state = propagate(state, DT) + shock
-        states.append(state)
-    return np.array(states)
+    return random_leader(generator, state, steps, DT, MODEL.noise)
 
 
 def drive(generator: np.random.Generator, noise: PoseNoise, steps: int) -> Run:
     """A random leader, followed on a circle that passes some half a metre beside where it starts."""
-    leader, own, pose = random_leader(generator, steps), Motion(0.15, 0.3), Pose(0.3, -0.5, 0.4)
+    leader, own, pose = drawn_leader(generator, steps), Motion(0.15, 0.3), Pose(0.3, -0.5, 0.4)
     poses, seen, truth = [], [], []
     for k, state in enumerate(leader):
         x, y, fx, fy, turned, v, u = (

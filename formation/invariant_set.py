@@ -13,7 +13,6 @@ A half of the cycle may end in the equilibrium that a constant d = -+D has: then
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -115,23 +114,6 @@ def invariant_set(system: Disturbed) -> InvariantSet | None:
                 outward=outward,
             )
     return None
-
-
-def drawn_in(system: Disturbed, found: InvariantSet, rho: float, alpha1: float) -> bool:
-    """Whether every motion from (rho, alpha1) ends in the set: the outermost one does, or winds onto it."""
-    if bool(found.contains(np.array(rho), np.array(alpha1))):
-        return True
-    theta = float(wrap(alpha1 - ABREAST_ALPHA1))
-    side = _RIGHT if theta > 0.0 or (theta == 0.0 and rho > system.spacing.rho_0) else _LEFT
-    psi = abs(theta)
-    for _ in range(_HALF_TURNS):
-        curve = system.half_turn(rho, psi, side) if psi < math.pi else None
-        if curve is None:
-            return False
-        rho, psi, side = float(curve[0][-1]), 0.0, -side
-        if found.rho_min - 1e-6 * rho <= rho <= found.rho_max + 1e-6 * rho:
-            return True
-    return False
 
 
 def _width(curve: tuple[FloatArray, FloatArray], rho: FloatArray) -> FloatArray:

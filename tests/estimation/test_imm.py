@@ -16,9 +16,8 @@ from estimation.motion import (
     LeaderLimits,
     Matrix,
     ProcessNoise,
-    process_noise,
-    propagate,
 )
+from estimation.random_leaders import random_leader
 
 DT = 1.0 / 120.0
 SIGMA = 1e-3
@@ -31,18 +30,13 @@ def model(bandwidth: float) -> Model:
     return Model(FrontEnd.WORLD, LIMITS, ProcessNoise.by_rule(LIMITS, bandwidth))
 
 
-def random_leader(generator: np.random.Generator, steps: int, bandwidth: float) -> Matrix:
+def drawn_leader(generator: np.random.Generator, steps: int, bandwidth: float) -> Matrix:
     """States (steps, 5) of a leader that moves as the process noise of this bandwidth says."""
     heading, noise = generator.uniform(-math.pi, math.pi), model(bandwidth).noise
     state = np.array(
         [0.0, 0.0, 0.2 * math.cos(heading), 0.2 * math.sin(heading), generator.uniform(-0.5, 0.5)]
     )
-    states = [state]
-    for _ in range(steps - 1):
-        shock = np.linalg.cholesky(process_noise(state, DT, noise)) @ generator.standard_normal(5)
-        state = propagate(state, DT) + shock
-        states.append(state)
-    return np.array(states)
+    return random_leader(generator, state, steps, DT, noise)
 
 
 def measured(generator: np.random.Generator, truth: Matrix) -> list[Measurement]:
@@ -67,7 +61,7 @@ def score(of: Estimator, bandwidth: float, runs: int = 6, steps: int = 480, late
     generator = np.random.default_rng(17)
     rows = []
     for _ in range(runs):
-        truth = random_leader(generator, steps, bandwidth)
+        truth = drawn_leader(generator, steps, bandwidth)
         seen = measured(generator, truth)
         belief = of.start(seen[0])
         for k in range(1, steps):
@@ -100,7 +94,7 @@ def test_whatever_the_leader_it_comes_close_to_the_filter_made_for_it(bandwidth:
 
 def test_one_mode_alone_is_the_plain_filter() -> None:
     generator = np.random.default_rng(2)
-    seen = measured(generator, random_leader(generator, 60, AGILE))
+    seen = measured(generator, drawn_leader(generator, 60, AGILE))
     alone, plain = InteractingModels(model(GENTLE), ExtendedFilter, [AGILE]), ExtendedFilter(model(AGILE))
     left, right = alone.start(seen[0]), plain.start(seen[0])
     for measurement in seen[1:]:
@@ -128,7 +122,7 @@ def test_a_mixture_has_the_moments_of_samples_drawn_from_it() -> None:
 
 def test_coasting_forgets_the_mode() -> None:
     generator = np.random.default_rng(4)
-    seen = measured(generator, random_leader(generator, 200, AGILE))
+    seen = measured(generator, drawn_leader(generator, 200, AGILE))
     of = InteractingModels(model(AGILE), ExtendedFilter)
     belief = of.start(seen[0])
     for measurement in seen[1:]:

@@ -18,9 +18,8 @@ from estimation.motion import (
     Matrix,
     ProcessNoise,
     Vector,
-    process_noise,
-    propagate,
 )
+from estimation.random_leaders import random_leader
 from formation.angles import wrap
 
 DT = 1.0 / 120.0
@@ -36,18 +35,13 @@ def seen(position: Vector, step: int = 0, sigma: float = SIGMA) -> Measurement:
     return Measurement(round(step * DT * 1e9), position, sigma**2 * np.eye(2), STANDING)
 
 
-def random_leader(generator: np.random.Generator, steps: int) -> Matrix:
+def drawn_leader(generator: np.random.Generator, steps: int) -> Matrix:
     """States (steps, 5) of a leader that moves as the model's own process noise says."""
     heading = generator.uniform(-math.pi, math.pi)
     state = np.array(
         [0.0, 0.0, 0.2 * math.cos(heading), 0.2 * math.sin(heading), generator.uniform(-0.5, 0.5)]
     )
-    states = [state]
-    for _ in range(steps - 1):
-        shock = np.linalg.cholesky(process_noise(state, DT, MODEL.noise)) @ generator.standard_normal(5)
-        state = propagate(state, DT) + shock
-        states.append(state)
-    return np.array(states)
+    return random_leader(generator, state, steps, DT, MODEL.noise)
 
 
 @pytest.mark.parametrize("kind", FILTERS)
@@ -156,7 +150,7 @@ def test_on_random_leaders_it_is_consistent_and_close_to_the_bound(kind: str) ->
     estimator = make_estimator(kind, MODEL)
     nis, errors, deviations, bounds = [], [], [], []
     for _ in range(runs):
-        truth = random_leader(generator, steps)
+        truth = drawn_leader(generator, steps)
         positions = truth[:, 0:2] + SIGMA * generator.standard_normal((steps, 2))
         belief = estimator.start(seen(positions[0]))
         for step in range(1, steps):

@@ -10,8 +10,9 @@ from estimation.estimator import Estimator
 from estimation.kalman import ExtendedFilter
 from estimation.measurement import FrontEnd, Measurement
 from estimation.memory import Horizon
-from estimation.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise, process_noise, propagate
+from estimation.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise
 from estimation.moving_horizon import MovingHorizon
+from estimation.random_leaders import random_leader
 
 DT = 1.0 / 120.0
 SIGMA = 1e-3
@@ -20,16 +21,11 @@ MODEL = Model(FrontEnd.WORLD, LIMITS, ProcessNoise.by_rule(LIMITS, 0.5))
 STANDING = FollowerMotion(0.0, 0.0, 0.005, 0.03)
 
 
-def random_leader(generator: np.random.Generator, steps: int) -> Matrix:
+def drawn_leader(generator: np.random.Generator, steps: int) -> Matrix:
     """States (steps, 5) of a leader that moves as the model's own process noise says."""
     heading = generator.uniform(-math.pi, math.pi)
     state = np.array([0.0, 0.0, 0.2 * math.cos(heading), 0.2 * math.sin(heading), 0.3])
-    states = [state]
-    for _ in range(steps - 1):
-        shock = np.linalg.cholesky(process_noise(state, DT, MODEL.noise)) @ generator.standard_normal(5)
-        state = propagate(state, DT) + shock
-        states.append(state)
-    return np.array(states)
+    return random_leader(generator, state, steps, DT, MODEL.noise)
 
 
 def measured(generator: np.random.Generator, truth: Matrix) -> list[Measurement]:
@@ -66,7 +62,7 @@ def test_on_random_leaders_it_is_as_good_as_the_filter() -> None:
     generator = np.random.default_rng(2)
     squares, nis = [], []
     for _ in range(5):
-        truth = random_leader(generator, 360)
+        truth = drawn_leader(generator, 360)
         seen = measured(generator, truth)
         (beliefs, found_nis), (peers, _) = (
             followed(of, seen) for of in (MovingHorizon(MODEL), ExtendedFilter(MODEL))
@@ -82,7 +78,7 @@ def test_on_random_leaders_it_is_as_good_as_the_filter() -> None:
 def test_from_no_knowledge_more_steps_find_the_least_of_the_cost() -> None:
     """The answer of many Gauss-Newton steps is a fixed point: yet another one changes nothing."""
     generator = np.random.default_rng(3)
-    seen = measured(generator, random_leader(generator, 12))
+    seen = measured(generator, drawn_leader(generator, 12))
     ends = [followed(MovingHorizon(MODEL, 12, count), seen)[0][-1] for count in (1, 15, 16)]
     assert ends[1].mean == pytest.approx(ends[2].mean, abs=1e-9)
     assert ends[0].mean[:4] == pytest.approx(ends[1].mean[:4], abs=5e-3)
@@ -90,7 +86,7 @@ def test_from_no_knowledge_more_steps_find_the_least_of_the_cost() -> None:
 
 def test_the_window_stays_as_long_as_it_is_set() -> None:
     generator = np.random.default_rng(4)
-    beliefs, _ = followed(MovingHorizon(MODEL, 7), measured(generator, random_leader(generator, 30)))
+    beliefs, _ = followed(MovingHorizon(MODEL, 7), measured(generator, drawn_leader(generator, 30)))
     lengths = []
     for belief in beliefs:
         assert isinstance(belief.memory, Horizon)

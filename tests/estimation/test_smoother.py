@@ -17,7 +17,8 @@ from estimation.measurement import (
     measure_body_from_mocap,
     measure_world,
 )
-from estimation.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise, process_noise, propagate
+from estimation.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise
+from estimation.random_leaders import random_leader
 from estimation.smoother import smooth
 from estimation.tracking import Status, Tracker, TrackPoint, TrackSettings, Verdict
 from formation.angles import wrap
@@ -36,16 +37,11 @@ def tracker(front_end: FrontEnd = FrontEnd.WORLD) -> Tracker:
     return Tracker(ExtendedFilter(Model(front_end, LIMITS, NOISE)), TrackSettings())
 
 
-def random_leader(generator: np.random.Generator, steps: int) -> Matrix:
+def drawn_leader(generator: np.random.Generator, steps: int) -> Matrix:
     """States (steps, 5) of a leader that moves as the process noise says."""
     heading = generator.uniform(-math.pi, math.pi)
     state = np.array([1.0, 0.5, 0.2 * math.cos(heading), 0.2 * math.sin(heading), 0.3])
-    states = [state]
-    for _ in range(steps - 1):
-        shock = np.linalg.cholesky(process_noise(state, DT, NOISE)) @ generator.standard_normal(5)
-        state = propagate(state, DT) + shock
-        states.append(state)
-    return np.array(states)
+    return random_leader(generator, state, steps, DT, NOISE)
 
 
 def followed(
@@ -83,7 +79,7 @@ def test_knowing_the_future_beats_the_filter(front_end: FrontEnd) -> None:
     of = tracker(front_end)
     filtered, smoothed = [], []
     for _ in range(6):
-        truth = random_leader(generator, 360)
+        truth = drawn_leader(generator, 360)
         seen, poses = followed(generator, truth, front_end)
         points = [of.begin(seen[0])]
         for measurement in seen[1:]:
@@ -99,7 +95,7 @@ def test_its_covariance_covers_its_errors() -> None:
     generator = np.random.default_rng(6)
     squares = []
     for _ in range(8):
-        truth = random_leader(generator, 300)
+        truth = drawn_leader(generator, 300)
         seen, _ = followed(generator, truth, FrontEnd.WORLD)
         for point, state in list(zip(smooth(tracker(), seen), truth, strict=True))[60:-60:20]:
             error = point.belief.mean - state
@@ -140,7 +136,7 @@ def test_without_turning_it_is_the_textbook_smoother() -> None:
 
 def test_order_and_duplicates_do_not_matter_and_the_newest_point_is_the_filter_s() -> None:
     generator = np.random.default_rng(2)
-    seen, _ = followed(generator, random_leader(generator, 60), FrontEnd.WORLD)
+    seen, _ = followed(generator, drawn_leader(generator, 60), FrontEnd.WORLD)
     of = tracker()
     straight = smooth(of, seen)
     shuffled = smooth(of, [seen[k] for k in generator.permutation([*range(60), 5, 50])])
@@ -154,7 +150,7 @@ def test_order_and_duplicates_do_not_matter_and_the_newest_point_is_the_filter_s
 
 def test_it_knows_the_direction_from_the_first_frame_on_and_through_a_gap() -> None:
     generator = np.random.default_rng(3)
-    truth = random_leader(generator, 300)
+    truth = drawn_leader(generator, 300)
     seen, poses = followed(generator, truth, FrontEnd.WORLD)
     kept = [k for k in range(300) if not 150 <= k < 210]
     points = smooth(tracker(), [seen[k] for k in kept])
@@ -164,7 +160,7 @@ def test_it_knows_the_direction_from_the_first_frame_on_and_through_a_gap() -> N
 
 def test_nothing_is_carried_back_over_a_restart_or_out_of_an_outlier() -> None:
     generator = np.random.default_rng(4)
-    seen, _ = followed(generator, random_leader(generator, 240), FrontEnd.WORLD)
+    seen, _ = followed(generator, drawn_leader(generator, 240), FrontEnd.WORLD)
     wild = replace(seen[60], position=seen[60].position + np.array([0.2, 0.1]))
     jumped = [replace(each, position=each.position + np.array([0.05, -0.05])) for each in seen[120:]]
     points = smooth(tracker(), [*seen[:60], wild, *seen[61:120], *jumped])

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from formation.closed_loop import integrate
-from formation.invariant_set import Disturbed, InvariantSet, drawn_in, invariant_set
+from formation.invariant_set import Disturbed, InvariantSet, invariant_set
 from formation.pose import Motion
 from formation.shape import ABREAST_ALPHA1, reduced_rates
 from formation.spacing import Spacing
@@ -96,15 +96,6 @@ def test_contains_tells_inside_from_outside() -> None:
     rho = np.array([0.2, 0.2, 0.2, 0.3, 0.26, 0.2])
     alpha1 = ABREAST_ALPHA1 + np.array([0.0, 0.65, 0.9, 0.0, 0.6, 2.0 * math.pi])
     assert inside.contains(rho, alpha1).tolist() == [True, True, False, False, False, True]
-
-
-def test_motions_from_nearby_are_drawn_in_and_from_far_away_may_not_be() -> None:
-    inside = found(TURTLEBOT3)
-    assert drawn_in(TURTLEBOT3, inside, 0.2, ABREAST_ALPHA1)
-    assert drawn_in(TURTLEBOT3, inside, 0.3, ABREAST_ALPHA1)
-    assert drawn_in(TURTLEBOT3, inside, 0.2, ABREAST_ALPHA1 - 1.0)
-    assert not drawn_in(TURTLEBOT3, inside, 1.0, ABREAST_ALPHA1)
-    assert not drawn_in(TURTLEBOT3, inside, 0.2, math.pi / 2.0)
 
 
 @pytest.mark.parametrize("speeds", [(0.0, 0.1), (0.2, 0.1), (0.1, math.inf), (math.nan, 0.1)])
