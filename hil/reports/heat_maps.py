@@ -72,7 +72,7 @@ MERITS = (
     ),
     Merit(
         "RMSE / best possible",
-        "Root mean square error over the posterior Cramér-Rao bound; 1 is the best there can be.",
+        "Root mean square error over the posterior Cramér-Rao bound; below 1 where the leader is calmer than the model takes it to be.",
         _efficiency,
         lambda value, _: f"{value:.2f}",
     ),
