@@ -72,7 +72,8 @@ MERITS = (
     ),
     Merit(
         "RMSE / best possible",
-        "Root mean square error over the posterior Cramér-Rao bound; below 1 where the leader is calmer than the model takes it to be.",
+        "Root mean square error over the posterior Cramér-Rao bound; below 1 where the leader is calmer "
+        "than the model takes it to be.",
         _efficiency,
         lambda value, _: f"{value:.2f}",
     ),
