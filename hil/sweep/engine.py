@@ -13,16 +13,16 @@ from estimation.estimate import QUANTITIES
 from estimation.estimators import settling
 from estimation.motion import LeaderLimits, ProcessNoise
 from estimation.tracking import TrackSettings
-from formation.angles import FloatArray
 from formation.leader import Table
 from formation.pose import Pose
-from hil.emulator.mocap import Stream, block_length, draw_block
+from hil.emulator.mocap import Stream, block_length
 from hil.errors import CheckFailedError, UsageError
 from hil.nodes.lockstep_run import STOPPING_NS
 from hil.scenario.parts import foresight, leader_program
 from hil.scenario.schema import ConstantProgram, ImpulseProgram, Scenario, SinusoidProgram
 from hil.scenario.start import start_poses
 from hil.sweep import engine_kernels as kernels
+from hil.sweep.noise_kernels import draw
 
 KINDS = {"ekf": kernels.EKF, "ukf": kernels.UKF, "difference": kernels.DIFFERENCE}
 LAWS = {
@@ -82,6 +82,28 @@ class LeastVariances:
     variances: dict[str, float]
 
 
+class _Numbers:
+    """Memory for a stream's random numbers: ``count`` normals and two uniforms for each of its items.
+
+    Without ``uniform`` the uniforms stay zero, and no normals are drawn past the last item.
+    """
+
+    def __init__(self, stream: Stream, items: int, count: int, *, uniform: bool = False) -> None:
+        self._stream, self._uniform = stream, uniform
+        length = block_length(stream)
+        self._firsts = range(0, items, length)
+        rows = len(self._firsts) * length if uniform else items
+        self.normals, self.shares = np.zeros((rows, count)), np.zeros((rows, 2))
+
+    def draw(self, seed: int) -> None:
+        """The numbers of a seed, as ``hil.emulator.mocap.draw_block`` has them."""
+        length = block_length(self._stream)
+        for block, first in enumerate(self._firsts):
+            normals = self.normals[first : first + length].reshape(-1)
+            shares = self.shares[first : first + length if self._uniform else first].reshape(-1)
+            draw(seed, self._stream, block, normals, shares)
+
+
 class Engine:
     """Flies runs of a scenario that differ by their seed.
 
@@ -111,17 +133,19 @@ class Engine:
         self._memory = _memory(_table(scenario), captures_ns, odometry_ns, commands)
         for name, array in self._memory.items():
             self._run[name] = array.ctypes.data
+        self._mocap = _Numbers(Stream.MOCAP, len(captures_ns), 6, uniform=scenario.mocap.loss > 0.0)
+        self._odometry = _Numbers(Stream.FOLLOWER_ODOMETRY, len(odometry_ns), 2)
+        self._run["frame_normals"] = self._mocap.normals.ctypes.data
+        self._run["frame_shares"] = self._mocap.shares.ctypes.data
+        self._run["odometry_normals"] = self._odometry.normals.ctypes.data
         self._estimates = np.zeros(commands, kernels.ESTIMATE)
         self._run["table_rows"] = len(self._memory["table"])
 
     def _flown(self, seed: int) -> bool:
-        run, memory = self._run, self._memory
-        frame_normals, shares = _draws(seed, Stream.MOCAP, len(memory["frames"]), 6)
-        odometry_normals, _ = _draws(seed, Stream.FOLLOWER_ODOMETRY, len(memory["samples"]), 2)
-        run["frame_normals"], run["frame_shares"] = frame_normals.ctypes.data, shares.ctypes.data
-        run["odometry_normals"] = odometry_normals.ctypes.data
+        self._mocap.draw(seed)
+        self._odometry.draw(seed)
         self._reset()
-        return kernels.fly(run)
+        return kernels.fly(self._run)
 
     @property
     def transport_ns(self) -> int:
@@ -316,15 +340,6 @@ def _table(scenario: Scenario) -> kernels.Records:
 def _dues(rate: float, seconds: float) -> NDArray[np.int64]:
     """When things that happen at a rate are due [ns], rounded as the emulator rounds."""
     return np.rint(np.arange(math.ceil(seconds * rate) + 2) / rate / _NS).astype(np.int64)
-
-
-def _draws(seed: int, stream: Stream, items: int, count: int) -> tuple[FloatArray, FloatArray]:
-    """Normals and uniforms of at least so many items, the emulator's own."""
-    blocks = [draw_block(seed, stream, block, count) for block in range(-(-items // block_length(stream)))]
-    if len(blocks) == 1:
-        return blocks[0]
-    normal, shares = zip(*blocks, strict=True)
-    return np.concatenate(normal), np.concatenate(shares)
 
 
 def _standing(pose: Pose) -> tuple[float, ...]:
