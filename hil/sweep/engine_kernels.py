@@ -34,7 +34,8 @@ INDEPENDENT, IDEAL, FEEDFORWARD, FADED = 0, 1, 2, 3
 CONSTANT, SINUSOID, IMPULSE, TABLE = 0, 1, 2, 3
 INITIALISING, TRACKING, COASTING, REJECTING, LOST = 0, 1, 2, 3, 4
 DRIVING, STOPPED, NO_ESTIMATE, GIVEN_UP, NOT_SETTLED, STALE, NOT_FINITE = 0, 1, 2, 3, 4, 5, 6
-SLOTS = 64
+SLOTS = 1024
+"""Places for arcs: a power of two that does not divide 100 ms, as spans often differ by an actuator lag."""
 
 _NS = 1e-9
 _NEVER = 2**62
@@ -184,7 +185,14 @@ _estimate = _element(ESTIMATE)
 
 def _compiled(*signature: object) -> Callable[[_F], _F]:
     """Compile for one signature now, or without one for whatever a kernel calls the function with."""
-    compiler: Any = njit(signature or None, cache=True, nogil=True, fastmath=False, error_model="numpy")
+    compiler: Any = njit(
+        signature or None,
+        cache=True,
+        nogil=True,
+        fastmath=False,
+        error_model="numpy",
+        forceinline=not signature,
+    )
     decorate: Callable[[_F], _F] = compiler
     return decorate
 
@@ -887,13 +895,8 @@ def _status(loop: Record, rules: Record, now_ns: int) -> int:
 
 
 @_compiled()
-def _tell_controller(
-    loop: Record, rules: Record, b: Record, pose: Record, frame: Record, now_ns: int
-) -> None:
-    """Hand over an estimate that may move the robot, along the follower's axes."""
-    dx, dy, c, s = b.x - pose.x, b.y - pose.y, pose.cos, pose.sin
-    loop.x, loop.y = c * dx + s * dy, c * dy - s * dx
-    loop.vx, loop.vy = c * b.vx + s * b.vy, c * b.vy - s * b.vx
+def _follow_trend(loop: Record, rules: Record, b: Record, now_ns: int) -> None:
+    """Smooth the leader's turn rate, as ``Foresight.heard`` does."""
     ahead = (now_ns + rules.ahead_ns - loop.track_ns) * _NS
     window = 0.5 * (b.u_u + rules.q_u * ahead) / rules.q_u
     if not loop.known:
@@ -901,6 +904,18 @@ def _tell_controller(
     else:
         share = -math.expm1(-((loop.track_ns - loop.capture_ns) * _NS) / window) if window > 0.0 else 1.0
         loop.slow_u1 += share * (b.u - loop.slow_u1)
+
+
+@_compiled()
+def _tell_controller(
+    loop: Record, rules: Record, b: Record, pose: Record, frame: Record, now_ns: int
+) -> None:
+    """Hand over an estimate that may move the robot, along the follower's axes."""
+    dx, dy, c, s = b.x - pose.x, b.y - pose.y, pose.cos, pose.sin
+    loop.x, loop.y = c * dx + s * dy, c * dy - s * dx
+    loop.vx, loop.vy = c * b.vx + s * b.vy, c * b.vy - s * b.vx
+    if rules.law in (FEEDFORWARD, FADED):
+        _follow_trend(loop, rules, b, now_ns)
     loop.u1, loop.var_u1, loop.v2, loop.u2 = b.u, b.u_u, frame.v2, frame.u2
     loop.known, loop.capture_ns, loop.measured_ns = 1, loop.track_ns, loop.used_ns
 
