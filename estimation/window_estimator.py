@@ -12,7 +12,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linprog
 
 from estimation.guarantees import guaranteed_window
 from formation.angles import FloatArray
@@ -56,6 +55,8 @@ def _solve(eps: float, A: float, times: FloatArray) -> WindowEstimator:
 
     All in units of the window and of eps / window, so that the solver's tolerances fit.
     """
+    from scipy.optimize import linprog  # a third of a second, for those only who solve
+
     n, window = len(times), -float(times[0])
     unit = times / window
     step = float(unit[1] - unit[0])

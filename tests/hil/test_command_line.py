@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 from hil.command_line import COMMANDS, main
+from hil.nodes.lockstep_run import run_lockstep
+from hil.scenario.files import load_scenario
 
 
 def abreast(*arguments: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
@@ -60,15 +62,19 @@ def test_a_mistake_gives_exit_code_2_and_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_lockstep_run_prints_one_json_object_and_leaves_its_files(tmp_path: Path) -> None:
-    arguments = ["run", "--lockstep", "--duration", "3", "--seed", "7", "--json"]
-    first = abreast(*arguments, "--out", "a", folder=tmp_path)
-    again = abreast(*arguments, "--out", "b", folder=tmp_path)
-    assert first.returncode == again.returncode == 0, first.stderr
+def test_a_lockstep_run_prints_one_json_object_and_leaves_its_files(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["run", "--lockstep", "--duration", "3", "--seed", "7", "--json", "--out"]
+    first = abreast(*arguments, "a", folder=tmp_path)
+    assert first.returncode == 0, first.stderr
     summary = json.loads(first.stdout)
     assert (summary["scenario"], summary["seed"], summary["mode"]) == ("turtlebot3", 7, "lockstep")
-    assert (tmp_path / "a" / "run.mcap").read_bytes() == (tmp_path / "b" / "run.mcap").read_bytes()
     assert json.loads((tmp_path / "a" / "summary.json").read_text())["frames"] == summary["frames"]
-    refused = abreast(*arguments, "--out", "a", folder=tmp_path)
-    assert refused.returncode == 2
-    assert "run.mcap exists already" in refused.stderr
+    again = tmp_path / "again.mcap"
+    run_lockstep(load_scenario("turtlebot3", ["run.duration_s=3.0", "run.seed=7"]), again)
+    assert (tmp_path / "a" / "run.mcap").read_bytes() == again.read_bytes()
+    with pytest.raises(SystemExit) as refused:
+        main([*arguments, str(tmp_path / "a")])
+    assert refused.value.code == 2
+    assert "run.mcap exists already" in capsys.readouterr().err

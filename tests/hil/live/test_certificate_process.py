@@ -7,13 +7,14 @@ from hil.live.certificate_process import CertificateProcess
 from hil.log.metadata import CERTIFICATE
 from hil.report_json import known
 from hil.scenario.files import load_scenario
+from tests.hil.live.child_run import PATIENCE
 
 
 def test_the_certificate_comes_once_and_is_the_scenario_s_own() -> None:
     scenario = load_scenario("turtlebot3", ["leader.k_u=0.6"])
     process = CertificateProcess(scenario)
     try:
-        found = process.result(timeout=60.0)
+        found = process.result(timeout=PATIENCE)
         assert json.loads(found[CERTIFICATE]["json"]) == known(certificate_json(certificate_of(scenario)))
         assert process.result() == {}
     finally:

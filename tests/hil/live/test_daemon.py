@@ -15,6 +15,7 @@ from hil.nodes.node import TICK, Event
 from hil.replay.rerun import replay
 from hil.scenario.files import load_scenario
 from hil.wire.session import free_endpoint
+from tests.hil.live.child_run import PATIENCE
 
 
 def daemon(name: str, folder: Path, *options: str) -> subprocess.Popen[str]:
@@ -26,27 +27,33 @@ def daemon(name: str, folder: Path, *options: str) -> subprocess.Popen[str]:
     )
 
 
+def wait_until_ready(name: str, process: subprocess.Popen[str], endpoint: str) -> None:
+    assert process.stderr is not None
+    assert process.stderr.readline().startswith(f"abreast {name}: ready, turtlebot3 on {endpoint}")
+
+
 def test_daemons_started_by_hand_find_each_other_and_end_when_told(tmp_path: Path) -> None:
     endpoint = free_endpoint()
-    recorder = daemon("recorder", tmp_path, "--listen", endpoint, "--out", "lab.mcap")
-    others = {
+    daemons = {
+        "recorder": daemon("recorder", tmp_path, "--listen", endpoint, "--out", "lab.mcap"),
         "estimator": daemon("estimator", tmp_path, "--connect", endpoint),
         "controller": daemon("controller", tmp_path, "--connect", endpoint),
-        "emulator": daemon("emulator", tmp_path, "--connect", endpoint, "--duration", "8"),
     }
     try:
-        assert others["emulator"].wait(timeout=60) == 0
-        others["controller"].terminate()
-        others["estimator"].send_signal(2)
-        for name, process in others.items():
-            assert f"abreast {name}: ready, turtlebot3 on {endpoint}" in process.communicate(timeout=20)[1]
-            assert process.returncode == 0
+        for name, process in daemons.items():
+            wait_until_ready(name, process, endpoint)
+        daemons["emulator"] = daemon("emulator", tmp_path, "--connect", endpoint, "--duration", "4")
+        wait_until_ready("emulator", daemons["emulator"], endpoint)
+        assert daemons["emulator"].wait(PATIENCE) == 0
+        daemons["controller"].terminate()
+        daemons["estimator"].send_signal(2)
+        for name in ("controller", "estimator"):
+            assert daemons[name].wait(PATIENCE) == 0
         time.sleep(0.2)
-        recorder.terminate()
-        assert recorder.communicate(timeout=20) is not None
-        assert recorder.returncode == 0
+        daemons["recorder"].terminate()
+        assert daemons["recorder"].wait(PATIENCE) == 0
     finally:
-        for process in (recorder, *others.values()):
+        for process in daemons.values():
             process.kill()
             process.communicate()
     log = read_log(tmp_path / "lab.mcap")
