@@ -43,6 +43,16 @@ class SideChange:
     arrived: bool = False
 
 
+def gentle(v1: float, u1: float, gains: Gains) -> bool:
+    """Whether a leader turns gently enough for a change: what is missing without its u1 can be outweighed."""
+    return gains.spacing.rho_0 * abs(u1) <= CORRECTION * v1
+
+
+def kept(gains: Gains) -> SideChange:
+    """State of a follower that was never told to change: it is where its gains have it."""
+    return SideChange(gains.station, gains.station.alpha1, arrived=True)
+
+
 def change_to(side: Side, shape: Shape, gains: Gains) -> SideChange:
     """Begin to change to a side from the shape at hand, at the bearing of the station so far."""
     return SideChange(Station(side, gains.station.bearing), shape.alpha1)

@@ -8,13 +8,12 @@ import numpy as np
 
 from controllers.laws import Gains, Law
 from controllers.limits import Limits
-from controllers.side_change import SideChange, change_step, change_to
+from controllers.side_change import change_step, change_to, kept
 from formation.angles import FloatArray
 from formation.closed_loop import Trajectory
 from formation.leader import LeaderProgram
 from formation.pose import Pose, advance
 from formation.shape import shape_of
-from formation.station import Side
 
 LONGEST_STEP = 0.05
 """Commands are held for at most this long [s]."""
@@ -41,7 +40,7 @@ def run_with_changes(
     dt = float(times[1] - times[0])
     substeps = max(1, round(np.ceil(dt / LONGEST_STEP - 1e-9)))
     held, waiting = dt / substeps, sorted(moments)
-    state = SideChange(gains.station, gains.station.alpha1, arrived=True)
+    state = kept(gains)
     rows: list[tuple[float, ...]] = []
     for t in times.tolist():
         for substep in range(substeps):
@@ -49,8 +48,7 @@ def run_with_changes(
             shape, driven = shape_of(leader, follower), program(now + 0.5 * held)
             while waiting and now >= waiting[0]:
                 waiting.pop(0)
-                other = Side.LEFT if state.station.side is Side.RIGHT else Side.RIGHT
-                state = change_to(other, shape, gains)
+                state = change_to(state.station.side.other, shape, gains)
             u1 = driven.u if knows_turn else 0.0
             state, wanted = change_step(state, shape, driven.v, u1, law, gains, limits, held)
             motion, _ = limits.apply(wanted)

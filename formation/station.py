@@ -16,6 +16,11 @@ class Side(Enum):
     RIGHT = "right"
     LEFT = "left"
 
+    @property
+    def other(self) -> Side:
+        """The opposite side."""
+        return Side.LEFT if self is Side.RIGHT else Side.RIGHT
+
 
 @dataclass(frozen=True, slots=True)
 class Station:

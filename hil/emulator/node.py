@@ -15,6 +15,7 @@ from msgspec import Struct, field
 from msgspec.structs import replace
 
 from formation.pose import STANDSTILL, Motion, Pose
+from formation.station import Side
 from hil.emulator.faults import Pair, faulty
 from hil.emulator.lab_messages import frame_message, odometry_message, truth_message
 from hil.emulator.mocap import (
@@ -50,6 +51,7 @@ class EmulatorState(Struct, frozen=True):
     ``alive``: nodes that have reported to be well. ``commanded``: followers that have had a command, by
     their place. ``motion_since_ns``: when the leader set off, None before. ``pending``: captured frames, and
     odometry that is told later, by release time. ``shown``: what the newest frame shows of every robot.
+    ``orders``: how many orders to change sides were given.
     """
 
     time_ns: int
@@ -66,6 +68,7 @@ class EmulatorState(Struct, frozen=True):
     refused: Counts = field(default_factory=no_counts)
     next_diagnostics_ns: int = 0
     shown: tuple[Pose, ...] = ()
+    orders: int = 0
 
 
 class EmulatorNode:
@@ -97,6 +100,7 @@ class EmulatorNode:
         self.clock = CaptureClock(
             mocap.clock_offset_s, mocap.clock_drift_ppm * 1e-6, mocap.clock_jump_s, mocap.clock_jump_at_s
         )
+        self.changes_s = sorted(scenario.formation.change_sides_at_s)
         self._handlers: dict[str, Callable[[EmulatorState, bytes, int], EmulatorState]] = {
             **{pair.cmd_vel: partial(self._on_command, k) for k, pair in enumerate(self.pairs, start=1)},
             topics.STOP: self._on_stop,
@@ -173,6 +177,7 @@ class EmulatorNode:
         state = self._lead(state, at_ns)
         for pair, (leader, follower) in zip(self.pairs, pairwise(state.robots), strict=True):
             out.append(outgoing(pair.truth, truth_message(at_ns, number, leader, follower), at_ns))
+        state = self._order(state, out)
         draw = draw_frame(self.scenario.run.seed, number, self.delivery, len(state.robots))
         state = replace(state, frames=number + 1)
         shown = () if draw.lost else self._shown(state, draw)
@@ -215,6 +220,18 @@ class EmulatorNode:
             state = replace(state, motion_since_ns=at_ns, next_diagnostics_ns=at_ns)
         command = self.actuators.accept(self.program((at_ns - since_ns) * _NS))
         return _with_command(state, 0, command)
+
+    def _order(self, state: EmulatorState, out: list[Outgoing]) -> EmulatorState:
+        """Tell the follower to go to the other side when the scenario says so, as an operator would."""
+        if state.motion_since_ns is None or state.stopped:
+            return state
+        t = (state.time_ns - state.motion_since_ns) * _NS
+        while state.orders < len(self.changes_s) and t >= self.changes_s[state.orders]:
+            state = replace(state, orders=state.orders + 1)
+            side = Side(self.scenario.formation.side)
+            order = msg.String(data=(side.other if state.orders % 2 else side).value)
+            out.append(outgoing(self.topics.side, order, state.time_ns))
+        return state
 
     def _sample_odometry(self, state: EmulatorState, out: list[Outgoing]) -> EmulatorState:
         number, at_ns, robot = state.odometry, state.time_ns, self.scenario.robot

@@ -21,7 +21,6 @@ from hil.figures.panel_strokes import (
 )
 from hil.figures.robot_drawing import FOLLOWER
 from hil.figures.shown import Shown, broken_at_jumps, with_gaps
-from hil.scenario.parts import station
 
 TRUE, ORBIT = "#3c3c3c", "#7a5fa8"
 _FARTHEST = 4.0
@@ -30,7 +29,7 @@ _FARTHEST = 4.0
 
 def draw_distance(axes: Axes, shown: Shown) -> None:
     """Distance: true (estimated where the truth is not known), on the noise-free orbit, and desired."""
-    _draw_desired(axes, shown, shown.evidence.scenario.formation.rho_0, r"$\rho_0$")
+    _draw_desired(axes, shown, 0, r"$\rho_0$")
     _draw_shape(axes, shown, shown.columns.truth.rho, shown.tracked.seen.rho, 0)
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel(r"$\rho$ [m]")
@@ -38,14 +37,14 @@ def draw_distance(axes: Axes, shown: Shown) -> None:
 
 def draw_alpha1(axes: Axes, shown: Shown) -> None:
     """Bearing of the follower from the leader, as :func:`draw_distance`."""
-    _draw_desired(axes, shown, station(shown.evidence.scenario).alpha1, "desired")
+    _draw_desired(axes, shown, 1, "desired")
     _draw_shape(axes, shown, shown.columns.truth.alpha1, shown.tracked.seen.alpha1, 1)
     axes.set_ylabel(r"$\alpha_1$ [rad]")
 
 
 def draw_alpha2(axes: Axes, shown: Shown) -> None:
     """Bearing of the leader from the follower, as :func:`draw_distance`."""
-    _draw_desired(axes, shown, station(shown.evidence.scenario).alpha2, "desired")
+    _draw_desired(axes, shown, 2, "desired")
     _draw_shape(axes, shown, shown.columns.truth.alpha2, shown.tracked.seen.alpha2, 2)
     axes.set_ylabel(r"$\alpha_2$ [rad]")
 
@@ -159,10 +158,11 @@ def panels_for(shown: Shown) -> tuple[list[Panel], list[Panel], list[Panel]]:
     return wire, shape, motion
 
 
-def _draw_desired(axes: Axes, shown: Shown, value: float, label: str) -> None:
+def _draw_desired(axes: Axes, shown: Shown, column: int, label: str) -> None:
     """Where the formation wants a quantity; other labs' robots were not told."""
     if shown.evidence.motion_since_ns is not None:
-        axes.axhline(value, color=LIMIT, lw=1.0, ls=":", label=label)
+        t, courses = shown.desired()
+        axes.plot(t, courses[column], color=LIMIT, lw=1.0, ls=":", label=label)
 
 
 def _draw_shape(axes: Axes, shown: Shown, true: FloatArray, seen: Values, column: int) -> None:

@@ -16,6 +16,7 @@ from hil.judge.bounds import WorstErrors, bound_errors, named_bounds, worst_erro
 from hil.judge.columns import Columns, EstimateColumns, columns_of
 from hil.judge.evidence import Evidence
 from hil.judge.noise_free_orbit import NoiseFreeOrbit, noise_free_orbit
+from hil.judge.side_orders import desired_bearings
 from hil.judge.true_states import Stamps, TrueStates
 
 LONGEST_LINE = 0.5
@@ -45,7 +46,8 @@ class Shown:
         """Gather what is drawn of an evidence."""
         columns = columns_of(evidence)
         driven = evidence.motion_since_ns is not None
-        orbit = noise_free_orbit(evidence.scenario, columns.truth, columns.run) if driven else None
+        scenario, orders = evidence.scenario, evidence.orders
+        orbit = noise_free_orbit(scenario, columns.truth, columns.run, orders) if driven else None
         during = columns.estimates.capture_ns <= columns.run.to_ns
         tracked = columns.estimates.only((columns.estimates.status == Status.TRACKING) & during)
         worst: WorstErrors | None = None
@@ -61,6 +63,14 @@ class Shown:
     def seconds(self, moments_ns: Stamps) -> FloatArray:
         """Moments as seconds of the run."""
         return np.asarray((moments_ns - self.evidence.zero_ns) * 1e-9, dtype=np.float64)
+
+    def desired(self) -> tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]]:
+        """Seconds and (rho, alpha1, alpha2) of the station over the run, with a corner at every order."""
+        run, scenario, orders = self.columns.run, self.evidence.scenario, self.evidence.orders
+        given = [order.given_ns for order in orders if run.from_ns < order.given_ns < run.to_ns]
+        corners = np.array([run.from_ns, *(ns for each in given for ns in (each - 1, each)), run.to_ns])
+        rho = np.full(len(corners), scenario.formation.rho_0)
+        return self.seconds(corners), (rho, *desired_bearings(scenario, orders, corners))
 
     @property
     def drawn_bound(self) -> str:

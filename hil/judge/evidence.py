@@ -11,13 +11,22 @@ from typing import Any, TypeVar
 from estimation.clock import Arrival
 from hil.certificate import certificate_json, certificate_of
 from hil.errors import UsageError
+from hil.judge.side_orders import Order, orders_of
 from hil.log.metadata import IMPORT, mode_of, recorded_certificate, scenario_of
 from hil.log.reader import Log, Record
 from hil.nodes.node import digest
 from hil.scenario.links import Link
 from hil.scenario.schema import Scenario
 from hil.wire import topics
-from hil.wire.message_types import Command, DiagnosticArray, LeaderEstimate, Message, RigidBodies, Truth
+from hil.wire.message_types import (
+    Command,
+    DiagnosticArray,
+    LeaderEstimate,
+    Message,
+    RigidBodies,
+    String,
+    Truth,
+)
 from hil.wire.messages import MalformedPayloadError, to_ns
 from hil.wire.topics import Topics, link_topics
 
@@ -59,6 +68,7 @@ class Evidence:
     ``evaluate_to_ns``: limits of the evaluation that take the place of those in the scenario. ``frames`` and
     ``log``: None where they are not known. ``arrivals``: all frames that the estimator could read, as they
     came. ``certificate``: what the log carries for this very scenario, None if it is to be worked out.
+    ``orders``: to change sides, as they were given.
 
     A replay is judged on the evidence of its log with its own estimates and counts put in by
     :func:`dataclasses.replace`.
@@ -80,6 +90,7 @@ class Evidence:
     arrivals: Sequence[Arrival] = ()
     log: LogFacts | None = None
     certificate: Mapping[str, Any] | None = None
+    orders: Sequence[Order] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,6 +176,7 @@ def evidence_of_link(log: Log, link: Link) -> Evidence:
         stopped_ns=records[topics.STOP][0].log_ns if records[topics.STOP] else None,
         frames=_frames(scenario, arrivals, truth),
         arrivals=arrivals,
+        orders=orders_of(scenario, _timed(log, records[names.side], String)),
         log=LogFacts(str(log.path), log.messages, log.path.stat().st_size),
         certificate=None if link.first else certificate_json(certificate_of(scenario, driven=False)),
     )
@@ -192,6 +204,7 @@ def _records(log: Log, names: Topics) -> dict[str, list[Record]]:
         topics.STOP,
         names.estimate,
         names.command,
+        names.side,
     )
     records: dict[str, list[Record]] = {topic: [] for topic in wanted}
     for record in log.records([topic for topic in wanted if topic in log.topics]):
@@ -200,14 +213,19 @@ def _records(log: Log, names: Topics) -> dict[str, list[Record]]:
 
 
 def _decoded(log: Log, records: Sequence[Record], kind: type[M]) -> list[M]:
-    messages: list[M] = []
+    return [message for _, message in _timed(log, records, kind)]
+
+
+def _timed(log: Log, records: Sequence[Record], kind: type[M]) -> list[tuple[int, M]]:
+    """Messages of a kind with the time of their record; what cannot be decoded is left out."""
+    messages: list[tuple[int, M]] = []
     for record in records:
         try:
             message = log.decode(record)
         except MalformedPayloadError:
             continue
         if isinstance(message, kind):
-            messages.append(message)
+            messages.append((record.log_ns, message))
     return messages
 
 

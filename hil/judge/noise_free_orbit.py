@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from controllers.laws import LAWS
+from controllers.laws import Gains
 from formation.angles import FloatArray, wrap
 from formation.pose import Motion
 from formation.shape import Shape, shape_rates
+from formation.station import Side
 from hil.judge.evidence import Span
+from hil.judge.side_orders import Order
 from hil.judge.true_states import Stamps, TrueStates
-from hil.scenario.parts import gains, limits
+from hil.scenario.parts import station_keeper
 from hil.scenario.schema import Scenario
 
 STEP = 1.0 / 30.0
@@ -39,13 +43,15 @@ class NoiseFreeOrbit:
         return rho, wrap(alpha1), wrap(alpha2)
 
 
-def noise_free_orbit(scenario: Scenario, truth: TrueStates, run: Span) -> NoiseFreeOrbit | None:
+def noise_free_orbit(
+    scenario: Scenario, truth: TrueStates, run: Span, orders: Sequence[Order] = ()
+) -> NoiseFreeOrbit | None:
     """Shape of a pair that starts as the run did and whose leader moves as the run's did.
 
     The follower drives what the scenario's law says on the true state, within the controller's limits, at
-    once. Eq. (3) of the paper by the classical Runge-Kutta method on (ln rho, alpha1, alpha2), the leader's
-    motion linear between the truths. None where the start or the leader's motion is not known, or where the
-    motion breaks down.
+    once, and changes sides by ``orders``. Eq. (3) of the paper by the classical Runge-Kutta method on
+    (ln rho, alpha1, alpha2), the leader's motion linear between the truths. None where the start or the
+    leader's motion is not known, or where the motion breaks down.
     """
     inside = (truth.capture_ns >= run.from_ns) & (truth.capture_ns <= run.to_ns)
     known = inside & np.isfinite(truth.v1) & np.isfinite(truth.u1) & np.isfinite(truth.alpha1)
@@ -69,32 +75,61 @@ def noise_free_orbit(scenario: Scenario, truth: TrueStates, run: Span) -> NoiseF
         float(truth.alpha2[known][0]),
     )
     try:
-        states = np.array(_integrate(scenario, start, driven, 2.0 * float(moments[1])))
+        due = [((order.given_ns - from_ns) * 1e-9, order.side) for order in orders]
+        states = np.array(_integrate(scenario, start, driven, 2.0 * float(moments[1]), due))
     except (ArithmeticError, ValueError):
         return None
     return NoiseFreeOrbit(from_ns, moments[::2], np.exp(states[:, 0]), states[:, 1], states[:, 2])
 
 
-def _integrate(scenario: Scenario, start: _State, driven: list[Motion], step: float) -> list[_State]:
+def _integrate(
+    scenario: Scenario,
+    start: _State,
+    driven: list[Motion],
+    step: float,
+    orders: list[tuple[float, Side]],
+) -> list[_State]:
     """States after every step, the first included; ``driven``: the leader's motion at every half step."""
-    law, with_gains, within = LAWS[scenario.controller.law], gains(scenario), limits(scenario)
-
-    def rates(state: _State, leader: Motion) -> _State:
-        shape = Shape(math.exp(state[0]), state[1], state[2])
-        follower, _ = within.apply(law(shape, leader.v, leader.u, with_gains, within))
-        change = shape_rates(shape, leader, follower)
-        return change.rho_dot / shape.rho, change.alpha1_dot, change.alpha2_dot
-
-    states = [start]
+    keeper = station_keeper(scenario)
+    law, within, keeping = keeper.law, keeper.limits, keeper.begin()
+    states, waiting = [start], deque(orders)
     for k in range(0, len(driven) - 1, 2):
-        state, middle = states[-1], driven[k + 1]
-        k1 = rates(state, driven[k])
-        k2 = rates(_moved(state, k1, 0.5 * step), middle)
-        k3 = rates(_moved(state, k2, 0.5 * step), middle)
-        k4 = rates(_moved(state, k3, step), driven[k + 2])
-        mean = tuple((a + 2.0 * b + 2.0 * c + d) / 6.0 for a, b, c, d in zip(k1, k2, k3, k4, strict=True))
-        states.append(_moved(state, (mean[0], mean[1], mean[2]), step))
+        while waiting and waiting[0][0] <= 0.5 * k * step:
+            keeping = replace(keeping, ordered=waiting.popleft()[1])
+        state, leader = states[-1], driven[k]
+        held = None
+        if keeping.waits or not keeping.change.arrived:
+            keeping, wanted = keeper.drive(keeping, _shape(state), leader, leader.u, step)
+            held = None if keeping.change.arrived else within.apply(wanted)[0]
+        at_station = replace(keeper.gains, station=keeping.change.station)
+
+        def rates(
+            state: _State, leader: Motion, held: Motion | None = held, at_station: Gains = at_station
+        ) -> _State:
+            shape = _shape(state)
+            follower = held or within.apply(law(shape, leader.v, leader.u, at_station, within))[0]
+            change = shape_rates(shape, leader, follower)
+            return change.rho_dot / shape.rho, change.alpha1_dot, change.alpha2_dot
+
+        states.append(_stepped(rates, state, driven[k : k + 3], step))
     return states
+
+
+def _stepped(
+    rates: Callable[[_State, Motion], _State], state: _State, driven: list[Motion], step: float
+) -> _State:
+    """State after a step of the Runge-Kutta method with the leader's motion at its begin, middle and end."""
+    before, middle, after = driven
+    k1 = rates(state, before)
+    k2 = rates(_moved(state, k1, 0.5 * step), middle)
+    k3 = rates(_moved(state, k2, 0.5 * step), middle)
+    k4 = rates(_moved(state, k3, step), after)
+    mean = tuple((a + 2.0 * b + 2.0 * c + d) / 6.0 for a, b, c, d in zip(k1, k2, k3, k4, strict=True))
+    return _moved(state, (mean[0], mean[1], mean[2]), step)
+
+
+def _shape(state: _State) -> Shape:
+    return Shape(math.exp(state[0]), state[1], state[2])
 
 
 def _moved(state: _State, rate: _State, dt: float) -> _State:

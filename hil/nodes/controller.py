@@ -10,12 +10,14 @@ from msgspec.structs import replace
 
 from controllers.feedforward import TurnTrend
 from controllers.guard import Decision, decide
-from controllers.laws import LAWS
 from controllers.resolution import NOTHING_OWED, Resolution
+from controllers.side_change import gentle
+from controllers.station_keeper import Keeping
 from estimation.estimate import Estimate
 from estimation.prediction import SentCommand, predict_shape
 from estimation.tracking import Status
 from formation.pose import Motion
+from formation.station import Side
 from hil.nodes.leader_turn import LeaderTurn
 from hil.nodes.node import (
     Counts,
@@ -28,7 +30,7 @@ from hil.nodes.node import (
     no_counts,
     outgoing,
 )
-from hil.scenario.parts import gains, limits
+from hil.scenario.parts import gains, limits, station_keeper
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -42,6 +44,7 @@ NAME = "controller"
 _DIAGNOSTICS_NS = 500_000_000
 _NS = 1e-9
 _LARGEST = 1e6
+_SHORTEST_STEP_NS = 1_000_000
 
 
 class ControllerState(Struct, frozen=True):
@@ -50,10 +53,11 @@ class ControllerState(Struct, frozen=True):
     ``estimate``: the newest one that may move the robot; ``status``: of the newest one of any kind.
     ``sent``: commands since that estimate's capture, oldest first, and the one before. ``leader_u1``: the
     turn rate that the leader was told to drive, kept for the law ``ideal``, nan before it is known.
-    ``trend``: of the estimated turn rate, kept for the laws that feed it forward. ``owed``: what rounding to
-    the robot's steps took off the last command.
+    ``trend``: of the estimated turn rate, kept for the laws that feed it forward. ``keeping``: the side that
+    was ordered. ``owed``: what rounding to the robot's steps took off the last command, of ``commanded_ns``.
     """
 
+    keeping: Keeping
     estimate: Estimate | None = None
     status: Status = Status.INITIALISING
     stopped: bool = False
@@ -65,19 +69,23 @@ class ControllerState(Struct, frozen=True):
     heard: bool = False
     leader_u1: float = math.nan
     trend: TurnTrend | None = None
+    commanded_ns: int = 0
     next_tick_ns: int = 0
     next_diagnostics_ns: int = 0
 
 
 class ControllerNode:
-    """Pure step of the controller of one follower."""
+    """Pure step of the controller of one follower.
 
-    def __init__(self, scenario: Scenario, name: str = NAME) -> None:
+    ``may_change``: whether it takes orders to change sides; in a chain others may be where it would go.
+    """
+
+    def __init__(self, scenario: Scenario, name: str = NAME, *, may_change: bool = True) -> None:
         given = scenario.controller
         self.name = name
         self.topics = topics_of(scenario)
-        self.law = LAWS[given.law]
-        self.gains, self.limits = gains(scenario), limits(scenario)
+        self.keeper, self.limits = station_keeper(scenario), limits(scenario)
+        self.leader_is_gentle = gentle(scenario.leader.k_v, scenario.leader.k_u, gains(scenario))
         self.resolution = Resolution(given.v_resolution, given.u_resolution)
         self.max_age = given.max_age_s
         self.lag = given.lag_s
@@ -86,11 +94,12 @@ class ControllerNode:
         self.tick_ns = round(1.0 / given.tick_hz / _NS)
         self.leader_turn = LeaderTurn(scenario)
         leader = (self.topics.leader_cmd_vel,) if self.leader_turn.is_told else ()
-        self.subscribes: tuple[str, ...] = (self.topics.estimate, topics.STOP, *leader)
+        orders = (self.topics.side,) if may_change else ()
+        self.subscribes: tuple[str, ...] = (self.topics.estimate, topics.STOP, *leader, *orders)
 
     def begin(self, now_ns: int) -> ControllerState:
         """State of a controller that has heard nothing: it keeps the robot still."""
-        return ControllerState(next_tick_ns=now_ns, next_diagnostics_ns=now_ns)
+        return ControllerState(self.keeper.begin(), next_tick_ns=now_ns, next_diagnostics_ns=now_ns)
 
     def due_ns(self, state: ControllerState) -> int:
         """Time of the next tick: a command leaves at least that often."""
@@ -120,6 +129,8 @@ class ControllerNode:
                 state = replace(state, trend=self.leader_turn.trend(state.trend, estimate, ahead))
         elif event.topic == self.topics.leader_cmd_vel:
             return self._hear_leader(state, event.payload), ()
+        elif event.topic == self.topics.side:
+            return self._hear_order(state, event.payload), ()
         elif event.topic:
             return state, ()
         state, out = self._command(state, now_ns, fresh=fresh)
@@ -132,27 +143,46 @@ class ControllerNode:
             return replace(state, refused=counted(state.refused, "malformed"))
         return replace(state, leader_u1=told.u)
 
+    def _hear_order(self, state: ControllerState, payload: bytes) -> ControllerState:
+        """Take an order, unless the leader may turn harder than a change of sides can make up for."""
+        keeping = state.keeping
+        try:
+            side = Side(decode_as(payload, msg.String).data)
+        except MalformedPayloadError:
+            return replace(state, refused=counted(state.refused, "malformed"))
+        except ValueError:
+            return replace(state, refused=counted(state.refused, "unknown_side"))
+        if side is not keeping.ordered and not self.leader_is_gentle:
+            return replace(state, refused=counted(state.refused, "unsafe_side_change"))
+        return replace(state, keeping=with_changes(keeping, ordered=side))
+
     def _command(
         self, state: ControllerState, now_ns: int, *, fresh: bool
     ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
-        decision, owed = self._decide(state, now_ns), NOTHING_OWED
-        if decision.stop is None:
+        keeping, decision = self._decide(state, now_ns)
+        owed = NOTHING_OWED
+        if decision.stop is not None:
+            keeping = with_changes(state.keeping, interrupted=True)
+        else:
             sent, owed = self.resolution.round(decision.sent, state.owed, self.limits)
             decision = with_changes(decision, sent=sent)
         acting = SentCommand(now_ns + self.transport_ns, decision.sent.v, decision.sent.u)
         receipts = state.receipts
         state = replace(
             state,
+            keeping=keeping,
             sent=self._recent((*state.sent, acting), state.estimate, now_ns),
             owed=owed,
             receipts=(),
             decided=counted(state.decided, decision.stop.value if decision.stop else "driving"),
+            commanded_ns=now_ns,
             next_tick_ns=now_ns + self.tick_ns,
         )
         return state, self._messages(state, decision, receipts, now_ns, fresh=fresh)
 
-    def _decide(self, state: ControllerState, now_ns: int) -> Decision:
-        estimate = state.estimate
+    def _decide(self, state: ControllerState, now_ns: int) -> tuple[Keeping, Decision]:
+        """Station and decision, as if the decision were to drive."""
+        estimate, keeping = state.estimate, state.keeping
         wanted: Motion | None = None
         age: float | None = None
         if estimate is not None:
@@ -161,10 +191,12 @@ class ControllerNode:
                 shape = predict_shape(estimate, state.sent, now_ns + self.ahead_ns, self.lag)
                 ahead = self._ahead(estimate, now_ns)
                 u1 = self.leader_turn.when_acting(state.leader_u1, state.trend, ahead)
-                wanted = self.law(shape, estimate.v1, u1, self.gains, self.limits)
+                elapsed = min(max(now_ns - state.commanded_ns, _SHORTEST_STEP_NS), self.tick_ns) * _NS
+                seen = Motion(estimate.v1, estimate.u1)
+                keeping, wanted = self.keeper.drive(keeping, shape, seen, u1, elapsed)
             else:
                 wanted = Motion(math.nan, math.nan)
-        return decide(
+        return keeping, decide(
             wanted,
             self.limits,
             age=age,
@@ -234,8 +266,18 @@ class ControllerNode:
         """Diagnostics: what was decided how often, and what was refused."""
         problem = "" if state.heard else "waiting for estimates"
         values: dict[str, object] = {"estimate": state.status.name.lower()}
+        values |= _side_report(state.keeping)
         values |= named_counts("decided", state.decided) | named_counts("refused", state.refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
+
+
+def _side_report(keeping: Keeping) -> dict[str, object]:
+    """The side that is kept or gone to, and what holds a change up."""
+    if keeping.waits:
+        change = "waits for a leader that turns less"
+    else:
+        change = "none" if keeping.change.arrived else "under way"
+    return {"side": keeping.ordered.value, "side_change": change}
 
 
 def _can_be(estimate: Estimate) -> bool:

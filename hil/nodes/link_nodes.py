@@ -13,5 +13,5 @@ def estimator_node(link: Link) -> EstimatorNode:
 
 
 def controller_node(link: Link) -> ControllerNode:
-    """Controller of a follower."""
-    return ControllerNode(link.scenario, link.node_name("controller"))
+    """Controller of a follower; only that of a pair takes orders to change sides."""
+    return ControllerNode(link.scenario, link.node_name("controller"), may_change=not link.in_chain)

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation.angles import FloatArray
-from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2
 from hil.figures.shown import Shown, broken_at_jumps
 from hil.judge.columns import inside
 from hil.reports.plots import (
@@ -19,10 +18,10 @@ from hil.reports.plots import (
     Key,
     Panel,
     TimeAxis,
-    draw_level,
     draw_line,
     hover,
     limits_around,
+    marks,
     table,
 )
 
@@ -69,20 +68,21 @@ def _panels(
 ) -> list[Panel]:
     colour, label = (BELIEVED, "estimate") if estimated else (TRUE, "truth")
     driven = shown.evidence.motion_since_ns is not None
-    desired = (shown.evidence.scenario.formation.rho_0, ABREAST_ALPHA1, ABREAST_ALPHA2)
+    since, desired = shown.desired()
     panels = []
     for k, (name, symbol, unit, title, says) in enumerate(_SHAPES):
         held = {"y": broken_at_jumps(courses[k])}
         if ideals is not None:
             held["ideal"] = broken_at_jumps(ideals[k])
-        level = [np.array([desired[k]])] if driven else []
+        level = [desired[k]] if driven else []
         floor = 0.0 if name == "rho" else -math.pi
         plot = axis.panel(f"{symbol} [{unit}]", limits_around(*held.values(), *level, floor=floor))
         source = table(t, held["y"], held)
         keys, tips = [Key(label, colour)], {"t": "@t{0.00} s", label: f"@y{{0.0000}} {unit}"}
         if driven:
-            draw_level(plot, desired[k], GREY, "dotted")
-            keys.append(Key(f"abreast, {desired[k]:.4g} {unit}", GREY, "dotted"))
+            draw_line(plot, marks(since, desired[k]), "y", GREY, dash="dotted")
+            at = ", ".join(f"{value:.4g}" for value in dict.fromkeys(desired[k].tolist()))
+            keys.append(Key(f"station, {at} {unit}", GREY, "dotted"))
         if ideals is not None:
             draw_line(plot, source, "ideal", ORBIT, dash="dashed")
             keys.append(Key("noise-free run", ORBIT, "dashed"))

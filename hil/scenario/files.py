@@ -48,7 +48,7 @@ def build_scenario(
 def refuse_unrunnable(scenario: Scenario) -> None:
     """Raise :class:`UsageError` if the scenario can be simulated or replayed only, not driven.
 
-    That is one with an estimator that needs to know the future, a flock of agents, or changes of side.
+    That is one with an estimator that needs to know the future, or a flock of agents.
     """
     kind = scenario.estimator.kind
     if kind in OFFLINE_ESTIMATORS:
@@ -62,10 +62,7 @@ def refuse_unrunnable(scenario: Scenario) -> None:
             f"abreast simulate {scenario.name} runs the flock"
         )
     if scenario.formation.change_sides_at_s:
-        raise UsageError(
-            f"scenario {scenario.name}: formation.change_sides_at_s is set, expected none: daemons cannot be "
-            f"told to change sides; abreast simulate {scenario.name} shows it"
-        )
+        refuse_chain(scenario, "formation.change_sides_at_s is for a pair: leave it out")
 
 
 def merged_scenario(part: Mapping[str, Any], name: str, source: str) -> Scenario:

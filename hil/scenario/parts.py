@@ -7,8 +7,9 @@ one place) is answered here, with a :class:`~hil.errors.UsageError` that names t
 from __future__ import annotations
 
 from controllers.feedforward import Foresight
-from controllers.laws import Gains
+from controllers.laws import LAWS, Gains
 from controllers.limits import Limits
+from controllers.station_keeper import StationKeeper
 from estimation.motion import LeaderLimits, ProcessNoise
 from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
 from formation.spacing import Spacing
@@ -47,6 +48,12 @@ def station(scenario: Scenario) -> Station:
 def limits(scenario: Scenario) -> Limits:
     """Limits that the controller keeps to."""
     return Limits(scenario.controller.v_max, scenario.controller.u_max)
+
+
+def station_keeper(scenario: Scenario) -> StationKeeper:
+    """The scenario's law at the follower's station, whichever side that comes to be on."""
+    law = scenario.controller.law
+    return StationKeeper(LAWS[law], gains(scenario), limits(scenario), knows_turn=law != "independent")
 
 
 def foresight(scenario: Scenario) -> Foresight:

@@ -43,7 +43,7 @@ class FormationSection(_Section, frozen=True, kw_only=True):
     """The follower's station: its distance rho_0 [m], the leader's side, and the bearing it keeps it at.
 
     ``bearing``: angle [rad] between the follower's heading and the line to the leader, pi/2 abreast.
-    ``change_sides_at_s``: when the follower is told to go to the other side; in simulations of a pair only.
+    ``change_sides_at_s``: when [s] the follower is told to go to the other side; of a pair only.
     """
 
     rho_0: Positive

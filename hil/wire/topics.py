@@ -73,6 +73,11 @@ class Topics:
         return f"{self.follower}/command"
 
     @property
+    def side(self) -> str:
+        """Orders to the follower: the side of its leader that it is to drive on, left or right."""
+        return f"{self.follower}/side"
+
+    @property
     def types(self) -> dict[str, str]:
         """Type name of every topic."""
         drive = TwistStamped if self.stamped else Twist
@@ -85,6 +90,7 @@ class Topics:
             self.sighting: typename_of(RangeBearing),
             self.estimate: typename_of(LeaderEstimate),
             self.command: typename_of(Command),
+            self.side: typename_of(String),
             self.truth: typename_of(Truth),
             DIAGNOSTICS: typename_of(DiagnosticArray),
             STOP: typename_of(String),

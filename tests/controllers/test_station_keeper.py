@@ -1,0 +1,76 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controllers.laws import LAWS, Gains
+from controllers.limits import Limits
+from controllers.side_change import CORRECTION
+from controllers.station_keeper import Keeping, StationKeeper
+from formation.pose import Motion
+from formation.shape import Shape
+from formation.spacing import Spacing
+from formation.station import Side, Station
+
+GAINS, LIMITS = Gains(1.0, 2.0, Spacing(0.5, 2.0)), Limits(1.5, 2.84)
+AT_STATION = Shape(0.5, -0.5 * math.pi, 0.5 * math.pi)
+V1 = 0.5
+TOO_HARD = 1.1 * CORRECTION * V1 / GAINS.spacing.rho_0
+
+
+def keeper(law: str = "independent") -> StationKeeper:
+    return StationKeeper(LAWS[law], GAINS, LIMITS, knows_turn=law != "independent")
+
+
+def ordered(side: Side) -> Keeping:
+    return replace(keeper().begin(), ordered=side)
+
+
+@given(
+    shape=st.builds(Shape, st.floats(0.1, 5.0), st.floats(-3.1, 3.1), st.floats(-3.1, 3.1)),
+    v1=st.floats(0.0, 1.0),
+    u1=st.floats(-2.0, 2.0),
+    law=st.sampled_from(["independent", "ideal"]),
+)
+def test_without_orders_it_is_the_law_to_the_last_bit(shape: Shape, v1: float, u1: float, law: str) -> None:
+    keeping, motion = keeper(law).drive(keeper(law).begin(), shape, Motion(v1, u1), u1, 0.01)
+    assert motion == LAWS[law](shape, v1, u1, GAINS, LIMITS)
+    assert keeping == keeper(law).begin()
+
+
+def test_a_change_waits_for_a_leader_that_turns_gently() -> None:
+    waiting, motion = keeper().drive(ordered(Side.LEFT), AT_STATION, Motion(V1, TOO_HARD), math.nan, 0.01)
+    assert waiting.waits
+    assert motion == LAWS["independent"](AT_STATION, V1, math.nan, GAINS, LIMITS)
+    begun, motion = keeper().drive(waiting, AT_STATION, Motion(V1, 0.0), math.nan, 0.01)
+    assert not begun.waits
+    assert not begun.change.arrived
+    assert motion.v < V1, "it falls behind first"
+
+
+def test_a_leader_that_turns_harder_on_the_way_does_not_end_the_change() -> None:
+    begun, _ = keeper().drive(ordered(Side.LEFT), AT_STATION, Motion(V1, 0.0), math.nan, 0.01)
+    going, _ = keeper().drive(begun, AT_STATION, Motion(V1, TOO_HARD), math.nan, 0.01)
+    assert (going.change.station.side, going.change.arrived) == (Side.LEFT, False)
+
+
+@pytest.mark.parametrize("u1", [0.0, TOO_HARD])
+def test_after_a_stop_a_change_begins_anew_from_where_the_pair_is(u1: float) -> None:
+    """The leader has driven on meanwhile: the place on the way that was left is somewhere else now."""
+    begun, _ = keeper().drive(ordered(Side.LEFT), AT_STATION, Motion(V1, 0.0), math.nan, 0.01)
+    behind = Shape(1.5, 2.5, 0.3)
+    going, _ = keeper().drive(replace(begun, interrupted=True), behind, Motion(V1, u1), math.nan, 0.01)
+    assert going.change.station == Station(Side.LEFT)
+    assert going.change.phase == pytest.approx(behind.alpha1, abs=0.02)
+    assert not going.interrupted
+
+
+def test_after_a_stop_at_its_station_the_law_goes_on() -> None:
+    stood = replace(keeper().begin(), interrupted=True)
+    keeping, motion = keeper().drive(stood, AT_STATION, Motion(V1, 0.0), math.nan, 0.01)
+    assert keeping == keeper().begin()
+    assert motion == LAWS["independent"](AT_STATION, V1, math.nan, GAINS, LIMITS)
