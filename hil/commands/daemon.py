@@ -46,7 +46,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         overrides: tuple[str, ...],
         out: Path | None = None,
         needs: str = "estimator,controller",
-        follower: str | None = None,
+        followers: tuple[str, ...] = (),
         tethered: bool = False,
     ) -> None:
         ending = Ending()
@@ -57,12 +57,12 @@ def daemon_command(name: str, summary: str) -> click.Command:
             connect = DEFAULT_ENDPOINT
         chosen = load_scenario(scenario, overrides)
         needed = frozenset(filter(None, needs.split(",")))
-        links = links_of(chosen) if follower is None else (link_of(chosen, follower),)
+        links = tuple(link_of(chosen, name) for name in dict.fromkeys(followers)) or links_of(chosen)
         order = Order(chosen, links, out, needed)
         endpoints = Endpoints(connect, listen, zenoh_config)
 
         def say_ready() -> None:
-            whom = "" if follower is None else f" for {follower}"
+            whom = f" for {', '.join(followers)}" if followers else ""
             click.echo(f"abreast {name}: ready{whom}, {chosen.name} on {endpoints.describe()}", err=True)
 
         prepare(types_of(chosen).values())
@@ -91,8 +91,8 @@ def daemon_command(name: str, summary: str) -> click.Command:
     if name == "recorder":
         options.append(click.Option(["--out"], type=path, required=True, help="Log to write (.mcap)."))
     if name in HOSTING:
-        whom = "The follower of a chain to serve, by its name; without it all."
-        options.append(click.Option(["--follower"], metavar="NAME", help=whom))
+        whom = "A follower of a chain to serve, by its name; may be given again. Without it all."
+        options.append(click.Option(["--follower", "followers"], multiple=True, metavar="NAME", help=whom))
     if name == "emulator":
         needs = "Daemons that must be well before the leader sets off, by commas."
         options.append(

@@ -42,11 +42,11 @@ class Children:
         self._folder = folder
         self._children: dict[str, Child] = {}
 
-    def start(self, name: str, arguments: list[str]) -> None:
-        """Start ``abreast NAME ARGUMENTS`` in a process group of its own, so that Ctrl-C reaches only us."""
+    def start(self, name: str, daemon: str, arguments: list[str]) -> None:
+        """Start ``abreast DAEMON ARGUMENTS`` in a process group of its own: Ctrl-C is to reach only us."""
         words = (self._folder / f".{name}.stderr").open("w+b")
         process = subprocess.Popen(
-            [sys.executable, "-m", "hil", name, *arguments, "--tethered"],
+            [sys.executable, "-m", "hil", daemon, *arguments, "--tethered"],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=words,

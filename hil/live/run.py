@@ -1,12 +1,13 @@
 """A live run: a router, four daemons as processes, and a supervisor that stops the robots if one fails.
 
-There are no more processes for a chain: its estimators share one, and its controllers another.
+A long chain has more: its controllers share a process, its estimators one for every few of them.
 """
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from hil.live.child_processes import Children
 from hil.live.daemon import Ending
 from hil.live.watch import Picture, Watch
 from hil.scenario.files import scenario_text
-from hil.scenario.links import links_of, node_names
+from hil.scenario.links import Link, links_of, node_names
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -26,6 +27,9 @@ from hil.wire.session import Endpoints, close_session, open_session
 from hil.wire.topics import link_topics, urgent_topics
 
 DAEMONS = ("recorder", "estimator", "controller", "emulator")
+FOLLOWERS_PER_ESTIMATOR = 4
+"""A process in Python keeps up with that many at 120 frames a second."""
+
 START_TIMEOUT = 30.0
 SILENCE = 3.0
 STANDSTILL_TIMEOUT = 2.0
@@ -61,6 +65,19 @@ def run_live(
         close_session(router)
 
 
+def processes_of(links: Sequence[Link]) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+    """Name, daemon, and the followers that it serves, of every process of a run; none named means all."""
+    for daemon in DAEMONS:
+        count = math.ceil(len(links) / FOLLOWERS_PER_ESTIMATOR) if daemon == "estimator" else 1
+        if count == 1:
+            yield daemon, daemon, ()
+            continue
+        each = math.ceil(len(links) / count)
+        for number in range(count):
+            share = links[number * each : (number + 1) * each]
+            yield f"{daemon}{number + 1}", daemon, tuple(link.follower for link in share)
+
+
 class _Supervisor:
     def __init__(self, scenario: Scenario, folder: Path, log_path: Path, endpoint: str) -> None:
         self._scenario = scenario
@@ -77,8 +94,13 @@ class _Supervisor:
             "recorder": ["--out", str(log_path)],
             "emulator": ["--needs", "estimator,controller,recorder"],
         }
-        for name in DAEMONS:
-            self._children.start(name, [str(resolved), "--connect", endpoint, *extra.get(name, [])])
+        self._names: dict[str, list[str]] = {daemon: [] for daemon in DAEMONS}
+        for name, daemon, followers in processes_of(links):
+            arguments = [str(resolved), "--connect", endpoint, *extra.get(daemon, [])]
+            for follower in followers:
+                arguments += ["--follower", follower]
+            self._children.start(name, daemon, arguments)
+            self._names[daemon].append(name)
 
     def run(self, ending: Ending, show: Show) -> Outcome:
         begun = time.monotonic()
@@ -104,9 +126,9 @@ class _Supervisor:
 
     def close(self) -> None:
         """Controller first, its last word being a standstill; recorder last, so that nothing is missed."""
-        self._children.end(["controller", "estimator"])
-        self._children.end(["emulator"])
-        self._children.end(["recorder"])
+        self._children.end([*self._names["controller"], *self._names["estimator"]])
+        self._children.end(self._names["emulator"])
+        self._children.end(self._names["recorder"])
         self._children.close()
         self._watch.close()
         self._wire.close()
