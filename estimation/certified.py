@@ -10,10 +10,32 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 
 from formation.angles import FloatArray, wrap
+
+_LONGEST = 1.5
+"""Pairs further apart than so many best windows tell next to nothing more."""
+_FEWEST_STEPS = 3.0
+"""Where measurements are rare, so many steps between them fit in, and one that is lost leaves no gap."""
+
+
+class Failed(Enum):
+    """Which premise of a certificate is seen to fail; the value is the word for it on the wire.
+
+    GAP: too few measurements of late. UNSEEN: the newest measurement was not believed.
+    NOISE: two positions are further apart than their errors and the leader's speed allow. SLOW: the leader is
+    slower than it should be. ACCELERATION: the velocities that the positions allow have nothing in common,
+    be it that the leader accelerated too hard or that their errors are too large.
+    """
+
+    GAP = "gap"
+    UNSEEN = "unseen"
+    NOISE = "noise"
+    SLOW = "slow"
+    ACCELERATION = "acceleration"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,54 +54,73 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class CertainMotion:
-    """What is certain of a leader at its newest position: speed [m/s], direction of motion [rad, world]."""
+    """What is certain of how a leader moves now: speed [m/s], direction of motion [rad]."""
 
     speed: Interval
     direction: Interval
 
 
-def certain_motion(
-    times: FloatArray, positions: FloatArray, eps: float, A: float, speeds: tuple[float, float]
-) -> CertainMotion | None:
-    """From positions (n, 2) [m] at increasing times (n,) [s]; None for fewer than two, or if they contradict.
+@dataclass(frozen=True, slots=True)
+class Certain:
+    """What is certain of a leader at a moment: v1 [m/s], alpha1 [rad], and from how many measurements."""
 
-    ``speeds``: least and largest speed that is known beforehand. They contradict each other if the noise or
-    the acceleration exceeds its bound.
+    v1: Interval
+    alpha1: Interval
+    measurements: int
+
+
+def certain_motion(
+    back: FloatArray, moved: FloatArray, blur: FloatArray | float, A: float, speeds: tuple[float, float]
+) -> CertainMotion | Failed:
+    """From the leader's displacement (n, 2) [m] since ``back`` (n,) [s] > 0 ago, for each known within blur.
+
+    ``blur``: bound of the displacement's error [m], of shape (n,) or the same for all. ``A``: bound of the
+    acceleration [m/s^2]. ``speeds``: least and largest speed [m/s] that is known beforehand. The direction is
+    in the frame of the displacements. Fails if they contradict what is assumed.
     """
-    if len(times) < 2:
-        return None
-    back = times[-1] - times[:-1]
-    quotient = (positions[-1] - positions[:-1]) / back[:, np.newaxis]
-    radius = 2.0 * eps / back + 0.5 * A * back
-    length = np.hypot(quotient[:, 0], quotient[:, 1])
+    if len(back) == 0:
+        return Failed.GAP
+    x, y = moved[:, 0] / back, moved[:, 1] / back
+    by_blur = blur / back
+    radius = by_blur + 0.5 * A * back
+    length = np.hypot(x, y)
+    if float(np.max(length - by_blur)) > speeds[1]:
+        return Failed.NOISE
     low = max(speeds[0], float(np.max(length - radius)))
-    high = min(speeds[1], float(np.min(length + radius)))
+    farthest = float(np.min(length + radius))
+    if farthest < speeds[0]:
+        return Failed.SLOW
+    high = min(speeds[1], farthest)
     if low > high:
-        return None
+        return Failed.ACCELERATION
+    speed = _between(low, high)
     best = int(np.argmin(radius))
-    direction = math.atan2(quotient[best, 1], quotient[best, 0])
+    if np.any(np.hypot(x - x[best], y - y[best]) > radius + radius[best]):
+        return Failed.ACCELERATION
+    direction = math.atan2(y[best], x[best])
     # A disc is seen from the origin under arcsin(radius / length); a known least speed helps as much.
     farther = np.maximum(length, low)
     half = np.where(radius < farther, np.arcsin(np.minimum(radius / farther, 1.0)), math.pi)
-    offset = np.asarray(wrap(np.arctan2(quotient[:, 1], quotient[:, 0]) - direction))
+    offset = np.asarray(wrap(np.arctan2(y, x) - direction))
     # Beyond half a turn about the best direction, intervals on the circle could meet twice.
     useful = np.abs(offset) + half < math.pi
     if not np.any(useful):
-        return CertainMotion(_between(low, high), Interval(direction, math.pi))
+        return CertainMotion(speed, Interval(direction, math.pi))
     left, right = float(np.max((offset - half)[useful])), float(np.min((offset + half)[useful]))
     if left > right:
-        return None
+        return Failed.ACCELERATION
     turned = _between(left, right)
-    return CertainMotion(_between(low, high), Interval(wrap(direction + turned.centre), turned.half))
+    return CertainMotion(speed, Interval(wrap(direction + turned.centre), turned.half))
 
 
-def certain_alpha1(motion: CertainMotion, leader: FloatArray, follower: FloatArray, eps: float) -> Interval:
-    """Bearing alpha1 [rad] from the measured positions (2,) of both robots, each within eps [m]."""
-    line = follower - leader
-    rho = float(np.hypot(*line))
-    blur = math.asin(2.0 * eps / rho) if rho > 2.0 * eps else math.pi
-    centre = wrap(math.atan2(line[1], line[0]) - motion.direction.centre)
-    return Interval(centre, min(motion.direction.half + blur, math.pi))
+def certain_alpha1(direction: Interval, line: Interval) -> Interval:
+    """Bearing alpha1 [rad] from the leader's direction of motion and that of the line to the follower."""
+    return Interval(wrap(line.centre - direction.centre), min(direction.half + line.half, math.pi))
+
+
+def window_ns(best: float, step: float) -> int:
+    """How far back to look [ns], from the window [s] that is best and the time [s] between measurements."""
+    return round(1e9 * max(_LONGEST * best, _FEWEST_STEPS * step))
 
 
 def _between(low: float, high: float) -> Interval:

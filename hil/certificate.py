@@ -10,14 +10,11 @@ from formation.shape import ABREAST_ALPHA2
 from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
 from formation.station import Side
+from hil.scenario.noise_bounds import NOISE_SIGMAS, position_bound
 from hil.scenario.schema import Scenario, TableProgram
 
 if TYPE_CHECKING:
     from estimation.certificate import Certificate, Claim
-
-NOISE_SIGMAS = 5.0
-"""Standard deviations that are taken for the bound of a Gaussian error. A position in the plane leaves the
-disc of this radius once in 270,000 frames, more than half an hour at 120 Hz."""
 
 
 def certificate_of(scenario: Scenario, *, driven: bool = True) -> Certificate:
@@ -33,9 +30,9 @@ def certificate_of(scenario: Scenario, *, driven: bool = True) -> Certificate:
 def premises_of(scenario: Scenario, *, driven: bool = True) -> Premises:
     """What the certificate of a scenario starts from."""
     leader, law = scenario.leader, scenario.controller
-    sigma, of_what = _sigma(scenario)
+    eps, of_what = _noise(scenario)
     return Premises(
-        eps=NOISE_SIGMAS * sigma,
+        eps=eps,
         step=1.0 / scenario.mocap.rate_hz,
         v_eps=leader.v_eps,
         k_v=leader.k_v,
@@ -44,7 +41,7 @@ def premises_of(scenario: Scenario, *, driven: bool = True) -> Premises:
         mu1=law.mu1,
         mu2=law.mu2,
         spacing=Spacing(scenario.formation.rho_0, law.mu_rho),
-        noise=f"positions within {NOISE_SIGMAS:g} sigma = {1e3 * NOISE_SIGMAS * sigma:.3g} mm ({of_what})",
+        noise=f"positions within {NOISE_SIGMAS:g} sigma = {1e3 * eps:.3g} mm ({of_what})",
         side=Side(scenario.formation.side),
         unproved=_unproved(scenario),
     )
@@ -60,13 +57,14 @@ def _unproved(scenario: Scenario) -> str:
     return ""
 
 
-def _sigma(scenario: Scenario) -> tuple[float, str]:
-    """Standard deviation of a leader position in the worst direction [m], and what of."""
+def _noise(scenario: Scenario) -> tuple[float, str]:
+    """Bound of the error of a leader position in the worst direction [m], and what of."""
     given = scenario.estimator
     if given.front_end == "world":
-        return max(given.sigma_position, scenario.mocap.sigma_position), "motion capture"
+        return position_bound(scenario), "motion capture"
     rho_0 = scenario.formation.rho_0
-    return max(given.sigma_range, rho_0 * given.sigma_bearing), f"range and bearing at {rho_0:g} m"
+    sigma = max(given.sigma_range, rho_0 * given.sigma_bearing)
+    return NOISE_SIGMAS * sigma, f"range and bearing at {rho_0:g} m"
 
 
 def _speeds(scenario: Scenario) -> SpeedRange:

@@ -9,11 +9,8 @@ from hil.log.reader import Log
 from hil.report_json import write_json
 
 
-def judge_log(log: Log, folder: Path, *, certify: bool = False) -> dict[str, Any]:
-    """Summary of the log of a pair; ``summary.json``, ``run.png`` and ``report.html`` go into the folder.
-
-    ``certify``: with the guaranteed error radius of every estimate judged as well.
-    """
+def judge_log(log: Log, folder: Path) -> dict[str, Any]:
+    """Summary of the log of a pair; ``summary.json``, ``run.png`` and ``report.html`` go into the folder."""
     # All that judging and drawing need: a second of imports, for those who ask only.
     from hil.figures.run_figures import draw_run
     from hil.figures.shown import Shown
@@ -23,10 +20,6 @@ def judge_log(log: Log, folder: Path, *, certify: bool = False) -> dict[str, Any
 
     evidence = evidence_of_log(log)
     summary = summarise(evidence)
-    if certify:
-        from hil.judge.certified import judge_certified
-
-        summary["certified"] = judge_certified(log, evidence)
     write_json(summary, folder / "summary.json")
     shown = Shown.of(evidence)
     draw_run(shown, summary, folder / "run.png")

@@ -20,6 +20,7 @@ from hil.replay.estimate_csv import write_estimates
 from hil.replay.rerun import replay_chain
 from hil.replay.verdict import evaluated, evidence_of_replay, parity_json, violated_bounds, why_not_same
 from hil.report_json import print_json, write_json
+from hil.scenario.certify import same_steps
 from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
 
@@ -30,17 +31,16 @@ class Wishes:
 
     verify: bool
     strict: bool
-    certify: bool
     as_json: bool
     from_s: float | None
     to_s: float | None
     out: Path | None
 
 
-def judge_run(log: Log, scenario: Scenario, folder: Path, *, certify: bool) -> dict[str, Any]:
+def judge_run(log: Log, scenario: Scenario, folder: Path) -> dict[str, Any]:
     """Judge the log of a run, and leave summary and picture beside it."""
     evidences = [evidence_of_link(log, link) for link in links_of(scenario)]
-    summary = _summary(log, scenario, evidences, certify=certify)
+    summary = summarise_chain(scenario, evidences)
     _write(scenario, evidences, summary, folder, "run.png")
     print_chain(summary)
     click.echo(
@@ -53,14 +53,15 @@ def judge_run(log: Log, scenario: Scenario, folder: Path, *, certify: bool) -> d
 
 def replay_run(log: Log, chosen: Scenario, wishes: Wishes) -> None:
     """Replay the log of a chain by a scenario, and do with the result what is wished."""
-    if wishes.verify and chosen != scenario_of(log):
+    own = scenario_of(log)
+    if wishes.verify and own is not None and not same_steps(chosen, own):
         raise UsageError(
             "--verify compares with what was recorded, with the log's own settings; leave out what changes "
             "them"
         )
     played = replay_chain(log, chosen)
     evidences = [evidence_of_replay(log, each, wishes.from_s, wishes.to_s) for each in played]
-    summary = _summary(log, chosen, evidences, certify=wishes.certify)
+    summary = summarise_chain(chosen, evidences)
     if wishes.verify:
         summary["parity"] = parity_json(*played)
         for pair, each in zip(summary["pairs"], played, strict=True):
@@ -79,16 +80,6 @@ def replay_run(log: Log, chosen: Scenario, wishes: Wishes) -> None:
         raise CheckFailedError(reason)
     if wishes.strict:
         _refuse_violated(log, summary)
-
-
-def _summary(log: Log, scenario: Scenario, evidences: Sequence[Evidence], *, certify: bool) -> dict[str, Any]:
-    summary = summarise_chain(scenario, evidences)
-    if certify:
-        from hil.judge.certified import judge_certified
-
-        for pair, evidence in zip(summary["pairs"], evidences, strict=True):
-            pair["certified"] = judge_certified(log, evidence)
-    return summary
 
 
 def _write(
@@ -118,4 +109,4 @@ def _refuse_violated(log: Log, summary: dict[str, Any]) -> None:
         for name, count in violated_bounds(pair).items()
     ]
     if broken:
-        raise CheckFailedError(f"log {log.path}: extended bounds violated (samples): {', '.join(broken)}")
+        raise CheckFailedError(f"log {log.path}: bounds violated (samples): {', '.join(broken)}")

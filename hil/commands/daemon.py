@@ -10,6 +10,7 @@ import click
 
 from hil.errors import UsageError
 from hil.live.daemon import Ending, NodeWorker, Worker, run_daemon
+from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario
 from hil.scenario.links import HOSTING, Link, link_of, links_of
 from hil.scenario.schema import Scenario
@@ -48,6 +49,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         needs: str = "estimator,controller",
         followers: tuple[str, ...] = (),
         tethered: bool = False,
+        certify: bool = False,
     ) -> None:
         ending = Ending()
         ending.on_signals()
@@ -55,7 +57,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
             ending.on_parent_gone()
         if not (connect or listen or zenoh_config):
             connect = DEFAULT_ENDPOINT
-        chosen = load_scenario(scenario, overrides)
+        chosen = load_scenario(scenario, (*overrides, CERTIFY) if certify else overrides)
         needed = frozenset(filter(None, needs.split(",")))
         links = tuple(link_of(chosen, name) for name in dict.fromkeys(followers)) or links_of(chosen)
         order = Order(chosen, links, out, needed)
@@ -93,6 +95,9 @@ def daemon_command(name: str, summary: str) -> click.Command:
     if name in HOSTING:
         whom = "A follower of a chain to serve, by its name; may be given again. Without it all."
         options.append(click.Option(["--follower", "followers"], multiple=True, metavar="NAME", help=whom))
+    if name == "estimator":
+        what = "Publish a guaranteed error radius of every estimate."
+        options.append(click.Option(["--certify"], is_flag=True, help=what))
     if name == "emulator":
         needs = "Daemons that must be well before the leader sets off, by commas."
         options.append(

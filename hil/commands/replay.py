@@ -10,6 +10,7 @@ import click
 
 from hil.errors import CheckFailedError, UsageError
 from hil.report_json import print_json, write_json
+from hil.scenario.certify import CERTIFY, same_steps
 
 if TYPE_CHECKING:
     from hil.judge.evidence import Evidence
@@ -32,8 +33,10 @@ if TYPE_CHECKING:
 @click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Folder for results."
 )
-@click.option("--strict", is_flag=True, help="Fail if an error lies outside its extended bound.")
-@click.option("--certify", is_flag=True, help="Judge the guaranteed error radius of every estimate too.")
+@click.option(
+    "--strict", is_flag=True, help="Fail if an error lies outside its extended bound or certified radius."
+)
+@click.option("--certify", is_flag=True, help="Judge a guaranteed error radius of every estimate too.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object on stdout.")
 def command(
     log: Path,
@@ -65,35 +68,32 @@ def command(
     if from_s is not None and to_s is not None and to_s <= from_s:
         raise UsageError(f"--to {to_s:g}: expected more than --from {from_s:g}")
     given = read_log(log)
+    if certify:
+        overrides = (*overrides, CERTIFY)
     if chart is None and follower is None and (chain := _chain(given, estimator, leader, overrides, table)):
         from hil.commands.chain_results import Wishes, replay_run
 
-        replay_run(given, chain, Wishes(verify, strict, certify, as_json, from_s, to_s, out))
+        replay_run(given, chain, Wishes(verify, strict, as_json, from_s, to_s, out))
         return
     played = _played(given, chart, estimator, leader, follower, overrides, verify=verify)
     evidence = evidence_of_replay(given, played, from_s, to_s)
     summary = summarise(evidence)
     if chart is None and (own_motion := judge_own_motion(given, played.scenario)):
         summary["own_motion"] = own_motion
-    if certify:
-        from hil.judge.certified import judge_certified
-
-        summary["certified"] = judge_certified(given, evidence)
     if verify:
         summary["parity"] = parity_json(played)
     _write(evidence, summary, table, out)
     print_summary(summary)
-    if verify and (unrecorded := sum(parity.unrecorded for parity in played.parity.values())):
-        click.echo(
-            f"{unrecorded} commands to the robot are not in the log: the recorder missed them", err=True
-        )
+    for name, what in (("commands", "commands to the robot"), ("certified", "certified estimates")):
+        if name in played.parity and (unrecorded := played.parity[name].unrecorded):
+            click.echo(f"{unrecorded} {what} are not in the log: the recorder missed them", err=True)
     if as_json:
         print_json(summary)
     if verify and (reason := why_not_same(given, played)):
         raise CheckFailedError(reason)
     if strict and (broken := violated_bounds(summary)):
         counts = ", ".join(f"{name} by {count}" for name, count in broken.items())
-        raise CheckFailedError(f"log {log}: extended bounds violated (samples): {counts}")
+        raise CheckFailedError(f"log {log}: bounds violated (samples): {counts}")
 
 
 def _played(
@@ -124,7 +124,7 @@ def _played(
     if chain_of(own) is not None and follower is not None:
         _refuse_leader(leader)
         link, was = link_of(with_overrides(own, kind), follower), link_of(own, follower)
-        if verify and link != was:
+        if verify and not same_steps(link.scenario, was.scenario):
             raise UsageError(
                 "--verify compares with what was recorded, with the log's own settings; leave out what "
                 "changes them"
@@ -133,7 +133,7 @@ def _played(
     names = {"leader.name": leader, "follower.name": follower}
     renamed = [f"{key}={name}" for key, name in names.items() if name is not None]
     chosen = with_overrides(own, [*kind, *renamed])
-    if verify and chosen != own:
+    if verify and not same_steps(chosen, own):
         raise UsageError(
             f"--verify compares with what was recorded: by {own.estimator.kind}, of leader "
             f"{own.leader.name!r} and follower {own.follower.name!r}, with the log's own settings; leave out "

@@ -11,6 +11,7 @@ import click
 
 from hil.errors import CheckFailedError, UsageError
 from hil.report_json import print_json
+from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario, refuse_unrunnable
 from hil.scenario.links import chain_of, links_of
 from hil.scenario.schema import Scenario
@@ -34,7 +35,9 @@ DURATION = click.FloatRange(min=0, min_open=True)
 @click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override any key of the scenario."
 )
-@click.option("--certify", is_flag=True, help="Judge the guaranteed error radius of every estimate too.")
+@click.option(
+    "--certify", is_flag=True, help="Publish and judge a guaranteed error radius of every estimate."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object on stdout.")
 def command(
     scenario: str,
@@ -52,7 +55,7 @@ def command(
     """Drive SCENARIO (a shipped name or a TOML file) through the whole chain, log it and judge it."""
     given = {"run.duration_s": duration, "run.seed": seed, "estimator.kind": estimator, "controller.law": law}
     options = [f"{key}={value}" for key, value in given.items() if value is not None]
-    chosen = load_scenario(scenario, [*overrides, *options])
+    chosen = load_scenario(scenario, [*overrides, *options, *([CERTIFY] if certify else [])])
     refuse_unrunnable(chosen)
     links_of(chosen)
     folder = _folder(chosen, out)
@@ -64,7 +67,7 @@ def command(
         raise CheckFailedError(failure or "interrupted before anything was recorded")
     if failure:
         _make_whole(log_path)
-    summary = _judge(log_path, folder, certify=certify)
+    summary = _judge(log_path, folder)
     if as_json:
         print_json(summary)
     if failure:
@@ -136,7 +139,7 @@ def _make_whole(log_path: Path) -> None:
         )
 
 
-def _judge(log_path: Path, folder: Path, *, certify: bool) -> dict[str, Any]:
+def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
     """Judge the log, leave summary, picture and report beside it, and print the verdict."""
     from hil.judge.summary_text import print_summary
     from hil.judged_log import judge_log
@@ -147,7 +150,7 @@ def _judge(log_path: Path, folder: Path, *, certify: bool) -> dict[str, Any]:
     if (own := scenario_of(log)) is not None and chain_of(own) is not None:
         from hil.commands.chain_results import judge_run
 
-        return judge_run(log, own, folder, certify=certify)
-    summary = judge_log(log, folder, certify=certify)
+        return judge_run(log, own, folder)
+    summary = judge_log(log, folder)
     print_summary(summary)
     return summary

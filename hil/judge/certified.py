@@ -1,90 +1,83 @@
-"""The certified radius around every estimate of a log: what noise and leader limits alone guarantee."""
+"""The verdict on certified estimates: how far their radii reach, and whether any error exceeds one."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimation.certified import certain_alpha1, certain_motion
-from estimation.guarantees import guaranteed_window
 from formation.angles import FloatArray, wrap
-from hil.certificate import premises_of
-from hil.errors import UsageError
-from hil.judge.columns import columns_of
-from hil.judge.evidence import Evidence
-from hil.log.reader import Log
-from hil.wire import topics
-from hil.wire.intake import RefusedError, read_frame
-from hil.wire.topics import topics_of
-
-_LONGEST_WINDOW = 1.5
-_Fix = tuple[float, float, float, float]
+from hil.judge.evidence import Span
+from hil.judge.true_states import Stamps, TrueStates
+from hil.wire.message_types import CertifiedEstimate
+from hil.wire.messages import to_ns
 
 
-def judge_certified(log: Log, evidence: Evidence) -> dict[str, Any]:
-    """The ``certified`` part of a summary of estimates in the world frame.
+@dataclass(frozen=True, slots=True, eq=False)
+class CertifiedColumns:
+    """Certified estimates as arrays of shape (n,); a radius is NaN where ``failed`` names a premise."""
 
-    Per quantity v1 [m/s] and alpha1 [rad] the median and the largest certified radius of the judged
-    estimates; where the truth is known, how many errors exceed it (none may) and the largest error / radius.
-    ``certified``: estimates that have a radius; ``contradicted``: those whose positions contradict the bounds
-    that were assumed. Raises :class:`UsageError` for the body front end, which has no positions.
+    capture_ns: Stamps
+    v1: FloatArray
+    radius_v1: FloatArray
+    alpha1: FloatArray
+    radius_alpha1: FloatArray
+    failed: NDArray[np.str_]
+
+    @staticmethod
+    def of(certified: Sequence[CertifiedEstimate], span: Span) -> CertifiedColumns:
+        """Columns of the messages whose capture lies within a span, in their order."""
+        stamped = [(to_ns(each.header.stamp), each) for each in certified]
+        kept = [(at, each) for at, each in stamped if span.from_ns <= at <= span.to_ns]
+        rows = [(each.v1, each.radius_v1, each.alpha1, each.radius_alpha1) for _, each in kept]
+        v1, radius_v1, alpha1, radius_alpha1 = np.array(rows, dtype=np.float64).reshape(-1, 4).T
+        return CertifiedColumns(
+            capture_ns=np.array([at for at, _ in kept], dtype=np.int64),
+            v1=v1,
+            radius_v1=radius_v1,
+            alpha1=alpha1,
+            radius_alpha1=radius_alpha1,
+            failed=np.array([each.failed for _, each in kept], dtype=np.str_),
+        )
+
+
+def judge_certified(certified: Sequence[CertifiedEstimate], truth: TrueStates, span: Span) -> dict[str, Any]:
+    """The ``certified`` part of a summary, of all certified estimates within a span; empty without any.
+
+    ``certified``: how many have radii; ``failed``: how many do not, by the premise that failed. Per quantity
+    v1 [m/s] and alpha1 [rad] the median and the largest radius; where the truth is known, how many errors
+    exceed theirs (none may) and the largest error / radius.
     """
-    scenario = evidence.scenario
-    if scenario.estimator.front_end != "world":
-        raise UsageError('--certify needs positions of the leader: estimator.front_end = "world"')
-    fixes = _fixes(log, evidence)
-    stamps = np.array(sorted(fixes), dtype=np.int64)
-    positions = np.array([fixes[at] for at in stamps.tolist()], dtype=np.float64).reshape(-1, 4)
-    given, columns = premises_of(scenario), columns_of(evidence)
-    window_ns = round(_LONGEST_WINDOW * 1e9 * float(guaranteed_window(given.eps, given.acceleration)))
-    samples, seen = columns.samples, columns.samples.seen
-    radii = np.full((len(samples.capture_ns), 2), math.nan)
-    contradicted = 0
-    for row, at in enumerate(samples.capture_ns.tolist()):
-        end = int(np.searchsorted(stamps, at, side="right"))
-        if not end or stamps[end - 1] != at:
-            continue
-        begin = int(np.searchsorted(stamps, at - window_ns))
-        times, xy = (stamps[begin:end] - at) * 1e-9, positions[begin:end]
-        motion = certain_motion(times, xy[:, :2], given.eps, given.acceleration, (given.v_eps, given.k_v))
-        if motion is None:
-            contradicted += int(end - begin > 1)
-            continue
-        bearing = certain_alpha1(motion, xy[-1, :2], xy[-1, 2:], given.eps)
-        radii[row, 0] = motion.speed.radius(float(np.asarray(seen.v1)[row]))
-        radii[row, 1] = bearing.radius(float(np.asarray(seen.alpha1)[row]), on_circle=True)
-    errors = {"v1": seen.v1 - columns.true.v1, "alpha1": wrap(np.asarray(seen.alpha1 - columns.true.alpha1))}
-    found: dict[str, Any] = {
-        name: _verdict(radii[:, column], np.abs(errors[name])) for column, name in enumerate(errors)
+    columns = CertifiedColumns.of(certified, span)
+    if not len(columns.capture_ns):
+        return {}
+    true = truth.at(columns.capture_ns)
+    has = np.isfinite(columns.radius_v1)
+    turned = np.asarray(wrap(np.asarray(columns.alpha1 - true.alpha1)))
+    return {
+        "certified": int(np.count_nonzero(has)),
+        "failed": dict(Counter(columns.failed[~has].tolist())),
+        "v1": _verdict(columns.radius_v1[has], np.abs(columns.v1 - true.v1)[has]),
+        "alpha1": _verdict(columns.radius_alpha1[has], np.abs(turned)[has]),
     }
-    return {"certified": int(np.isfinite(radii[:, 0]).sum()), "contradicted": contradicted} | found
+
+
+def certified_violations(summary: Mapping[str, Any]) -> dict[str, int]:
+    """Quantities whose certified radii were violated, such as v1_certified, with the number of samples."""
+    parts = {name: summary.get("certified", {}).get(name, {}) for name in ("v1", "alpha1")}
+    return {f"{name}_certified": part["violations"] for name, part in parts.items() if part.get("violations")}
 
 
 def _verdict(radius: FloatArray, error: FloatArray) -> Mapping[str, float]:
-    has = np.isfinite(radius)
-    if not np.any(has):
+    if not len(radius):
         return {}
-    told = {"median": float(np.median(radius[has])), "largest": float(np.max(radius[has]))}
-    judged = has & np.isfinite(error)
+    told = {"median": float(np.median(radius)), "largest": float(np.max(radius))}
+    judged = np.isfinite(error)
     if not np.any(judged):
         return told
     ratio = error[judged] / np.maximum(radius[judged], 1e-12)
     return told | {"violations": int(np.count_nonzero(ratio > 1.0)), "tightness": float(np.max(ratio))}
-
-
-def _fixes(log: Log, evidence: Evidence) -> dict[int, _Fix]:
-    """Positions of leader and follower by capture time, of frames that are whole."""
-    names = topics_of(evidence.scenario)
-    fixes: dict[int, _Fix] = {}
-    if topics.RIGID_BODIES not in log.topics:
-        raise UsageError(f"log {log.path}: --certify needs motion capture of the leader; it has none")
-    for record in log.records([topics.RIGID_BODIES]):
-        try:
-            frame = read_frame(record.payload, names.leader, names.follower)
-        except RefusedError:
-            continue
-        fixes[frame.capture_ns] = (*frame.leader, frame.follower.x, frame.follower.y)
-    return fixes

@@ -15,10 +15,12 @@ from hil.judge.side_orders import Order, orders_of
 from hil.log.metadata import IMPORT, mode_of, recorded_certificate, scenario_of
 from hil.log.reader import Log, Record
 from hil.nodes.node import digest
+from hil.scenario.certify import same_steps
 from hil.scenario.links import Link
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.message_types import (
+    CertifiedEstimate,
     Command,
     DiagnosticArray,
     LeaderEstimate,
@@ -67,7 +69,8 @@ class Evidence:
     ``stopped_ns``: when the first stop was ordered, None for none. ``evaluate_from_ns``,
     ``evaluate_to_ns``: limits of the evaluation that take the place of those in the scenario. ``frames`` and
     ``log``: None where they are not known. ``arrivals``: all frames that the estimator could read, as they
-    came. ``certificate``: what the log carries for this very scenario, None if it is to be worked out.
+    came. ``certified``: estimates with guaranteed radii, where these were asked for. ``certificate``: what
+    the log carries for this very scenario, None if it is to be worked out.
     ``orders``: to change sides, as they were given.
 
     A replay is judged on the evidence of its log with its own estimates and counts put in by
@@ -88,6 +91,7 @@ class Evidence:
     evaluate_to_ns: int | None = None
     frames: Frames | None = None
     arrivals: Sequence[Arrival] = ()
+    certified: Sequence[CertifiedEstimate] = ()
     log: LogFacts | None = None
     certificate: Mapping[str, Any] | None = None
     orders: Sequence[Order] = ()
@@ -148,7 +152,8 @@ def evidence_of_log(log: Log, scenario: Scenario | None = None) -> Evidence:
     if scenario is None:
         raise UsageError(f"log {log.path}: does not tell its scenario; give one, or a map that names one")
     evidence = evidence_of_link(log, Link(scenario))
-    return replace(evidence, certificate=recorded_certificate(log) if scenario == own else None)
+    same = own is not None and same_steps(scenario, own)
+    return replace(evidence, certificate=recorded_certificate(log) if same else None)
 
 
 def evidence_of_link(log: Log, link: Link) -> Evidence:
@@ -177,6 +182,7 @@ def evidence_of_link(log: Log, link: Link) -> Evidence:
         frames=_frames(scenario, arrivals, truth),
         arrivals=arrivals,
         orders=orders_of(scenario, _timed(log, records[names.side], String)),
+        certified=_decoded(log, records[names.certified], CertifiedEstimate),
         log=LogFacts(str(log.path), log.messages, log.path.stat().st_size),
         certificate=None if link.first else certificate_json(certificate_of(scenario, driven=False)),
     )
@@ -203,6 +209,7 @@ def _records(log: Log, names: Topics) -> dict[str, list[Record]]:
         topics.DIAGNOSTICS,
         topics.STOP,
         names.estimate,
+        names.certified,
         names.command,
         names.side,
     )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from hil.certificate import certificate_json, certificate_of
 from hil.judge.assumptions import judge_assumptions
 from hil.judge.bounds import judge_bounds
+from hil.judge.certified import judge_certified
 from hil.judge.clock import judge_clock
 from hil.judge.columns import Columns, columns_of
 from hil.judge.estimation import judge_estimation
@@ -29,8 +30,8 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
     of the scenario's duration. ``estimation.untracked``: estimates in that time that said anything else.
     ``frames.rejected``: inputs that were refused, the robots' odometry included; frames that also held
     strangers do not count. ``commands``: those from when the leader set off to the stop. ``seed`` and ``law``
-    are absent for recordings that were not driven by them. ``certificate``: what was guaranteed beforehand,
-    as ``abreast bounds`` prints it.
+    are absent for recordings that were not driven by them. ``certified``: only where estimates are certified.
+    ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it.
     """
     columns = columns_of(evidence)
     given = evidence.scenario
@@ -45,6 +46,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "frames": _frames(evidence),
         "estimation": judge_estimation(evidence, columns),
         "bounds": judge_bounds(given, columns) | judge_assumptions(given, columns),
+        "certified": judge_certified(evidence.certified, columns.truth, columns.span),
         "certificate": evidence.certificate or certificate_json(certificate_of(given, driven=driven)),
         "formation": judge_formation(evidence, columns),
         "latency_ms": _latency(columns),

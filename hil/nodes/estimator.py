@@ -26,6 +26,7 @@ from estimation.own_motion import OwnTrack
 from estimation.screening import Cause
 from estimation.tracking import Status, Track, Verdict, cause_at
 from formation.angles import wrap
+from hil.nodes.certifying import Believed, certifying
 from hil.nodes.frame_time import FrameTime
 from hil.nodes.leader_filter import leader_tracker, offsets_report
 from hil.nodes.node import (
@@ -44,6 +45,7 @@ from hil.nodes.status_reasons import reason_for
 from hil.scenario.files import refuse_unrunnable
 from hil.scenario.schema import Scenario
 from hil.wire import topics
+from hil.wire.certified_message import certified_message
 from hil.wire.estimate_message import AssumedErrors, to_message
 from hil.wire.intake import RefusedError, read_frame, read_odometry, read_sighting
 from hil.wire.message_types import Consumed
@@ -61,13 +63,15 @@ class EstimatorState(Struct, frozen=True):
     """All that the estimator remembers.
 
     ``track``: of the leader. ``own``: what was heard of the follower's motion. ``times``: what is known of
-    the clock that frames are stamped by. ``receipts``: inputs since the last estimate. ``refused``: inputs
-    that were not used, by cause. ``taken``: inputs that were used, by kind.
+    the clock that frames are stamped by. ``believed``: what certificates rest on, if any are asked for.
+    ``receipts``: inputs since the last estimate. ``refused``: inputs that were not used, by cause. ``taken``:
+    inputs that were used, by kind.
     """
 
     track: Track = ()
     own: OwnMotion = OwnMotion()
     times: HostTime = HostTime()
+    believed: Believed = Believed()
     receipts: tuple[Consumed, ...] = ()
     refused: Counts = field(default_factory=no_counts)
     taken: Counts = field(default_factory=no_counts)
@@ -95,6 +99,7 @@ class EstimatorNode:
         self.pose_noise = PoseNoise(given.sigma_position, given.sigma_heading)
         self.assumed = AssumedErrors.of(scenario)
         self.frame_time = FrameTime(scenario)
+        self.certifying = certifying(scenario)
         self._handlers: dict[str, Callable[[EstimatorState, bytes, int], EstimatorState]] = {
             topics.RIGID_BODIES: self._on_frame,
             self.topics.odom: self._on_odometry,
@@ -143,7 +148,8 @@ class EstimatorNode:
         if timed.refusal:
             return replace(state, refused=counted(state.refused, timed.refusal))
         if timed.restart:
-            state = replace(state, track=(), own=with_changes(state.own, track=()))
+            forgotten = with_changes(state.own, track=())
+            state = replace(state, track=(), own=forgotten, believed=Believed())
         capture_ns = timed.capture_ns
         state = replace(state, taken=counted(state.taken, "frames"))
         if frame.strangers:
@@ -194,6 +200,8 @@ class EstimatorNode:
             state = replace(state, refused=counted(state.refused, (cause or verdict).value))
         else:
             state = replace(state, taken=counted(state.taken, "used"))
+            if self.certifying is not None:
+                state = replace(state, believed=self.certifying.heard(state.believed, measurement))
         if late and verdict is not Verdict.DUPLICATE:
             state = replace(state, taken=counted(state.taken, "late"))
         return replace(state, track=track)
@@ -204,8 +212,12 @@ class EstimatorNode:
             return state, ()
         reason = reason_for(estimate.status, state.track)
         message = to_message(estimate, now_ns, self.topics.follower, reason, self.assumed, state.receipts)
-        out = outgoing(self.topics.estimate, message, estimate.capture_ns)
-        return replace(state, receipts=(), last_out_ns=now_ns), (out,)
+        out = [outgoing(self.topics.estimate, message, estimate.capture_ns)]
+        if self.certifying is not None:
+            certain = self.certifying.certain(state.believed, state.own.history, estimate.capture_ns)
+            certified = certified_message(estimate, certain, now_ns, self.topics.follower)
+            out.append(outgoing(self.topics.certified, certified, estimate.capture_ns))
+        return replace(state, receipts=(), last_out_ns=now_ns), tuple(out)
 
     def _tick(self, state: EstimatorState, now_ns: int) -> tuple[EstimatorState, tuple[Outgoing, ...]]:
         """Speak up while measurements are missing, and report on the node itself."""

@@ -141,6 +141,25 @@ def parity_of(repeated: Sequence[Repeated], topic: str, beside: Mapping[str, Seq
     return Parity(len(repeated), len(wrong), min(wrong, default=None), unrecorded)
 
 
+def parity_beside(outputs: Iterable[Outgoing], topic: str, logged: Sequence[bytes]) -> Parity:
+    """Compare what was logged on a topic that a node sends to beside its outputs, bit for bit.
+
+    A logged payload agrees if the node put it out too, as often as it is logged. What is logged after all
+    that can be repeated does not count: the node went on after its last recorded output.
+    """
+    unmatched = Counter(message.payload for message in outputs if message.topic == topic)
+    sent, wrong, agreed = unmatched.total(), [], 0
+    for place, payload in enumerate(logged):
+        if unmatched[payload]:
+            unmatched[payload] -= 1
+            agreed = place + 1
+        else:
+            wrong.append(place)
+    compared = min(len(logged), agreed + unmatched.total())
+    wrong = [place for place in wrong if place < compared]
+    return Parity(compared, len(wrong), min(wrong, default=None), max(0, sent - compared))
+
+
 def _compare_in_order(sent: Sequence[tuple[int, int]], logged: Sequence[int]) -> tuple[set[int], int]:
     """Places of what was sent and is logged as something else, and how much is not logged at all.
 

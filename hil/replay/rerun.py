@@ -15,9 +15,10 @@ from hil.nodes.estimator import EstimatorNode, EstimatorState
 from hil.nodes.link_nodes import controller_node, estimator_node
 from hil.nodes.node import Outgoing, digest
 from hil.replay.foreign_log import foreign_events
-from hil.replay.journal import Journey, Parity, feed, index_by_digest, parity_of, refeed
+from hil.replay.journal import Journey, Parity, feed, index_by_digest, parity_beside, parity_of, refeed
 from hil.replay.smoothing import ListeningEstimator, smoothed_estimates
 from hil.replay.topic_map import TopicMap
+from hil.scenario.certify import same_steps
 from hil.scenario.links import Link, links_of
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
@@ -30,8 +31,9 @@ M = TypeVar("M", bound=msg.Message)
 class Replay:
     """What came out of a replay of one follower's life.
 
-    ``parity``: by ``estimates`` and ``commands``, how they compare with the recorded ones; empty where the
-    log was estimated anew. ``missing_inputs``: inputs that were consumed live but are not in the log.
+    ``parity``: by ``estimates``, ``commands`` and, where the log has any, ``certified``, how they compare
+    with the recorded ones; empty where the log was estimated anew. ``missing_inputs``: inputs that were
+    consumed live but are not in the log. ``certified``: estimates with radii, where these are asked for.
     ``controller``: None where there were no commands to repeat.
     """
 
@@ -42,6 +44,7 @@ class Replay:
     controller: ControllerState | None = None
     parity: Mapping[str, Parity] = field(default_factory=dict)
     missing_inputs: int = 0
+    certified: tuple[msg.CertifiedEstimate, ...] = ()
 
     @property
     def scenario(self) -> Scenario:
@@ -57,10 +60,10 @@ class Replay:
 def replay(log: Log, scenario: Scenario | None = None) -> Replay:
     """Put one of our logs through the estimator of a scenario (the log's own by default).
 
-    A log with estimates is replayed by what each of these consumed: with its own scenario its estimates and
-    commands come out again, bit for bit; with another one its estimates are made anew, and there are no
-    commands, as these would have moved the robot elsewhere. A log without estimates is fed in log order.
-    Raises :class:`UsageError` for a log that is not ours or lacks what the estimator needs.
+    A log with estimates is replayed by what each of these consumed: with its own scenario, certified or not,
+    its estimates and commands come out again, bit for bit; with another one its estimates are made anew, and
+    there are no commands, as these would have moved the robot elsewhere. A log without estimates is fed in
+    log order. Raises :class:`UsageError` for a log that is not ours or lacks what the estimator needs.
     """
     own = _own_scenario(log)
     return replay_link(log, Link(own if scenario is None else scenario), Link(own))
@@ -82,7 +85,7 @@ def replay_chain(log: Log, scenario: Scenario | None = None) -> tuple[Replay, ..
 
 def replay_link(log: Log, chosen: Link, own: Link) -> Replay:
     """Replay of one follower by a link that may differ from the log's own; see :func:`replay`."""
-    if chosen != own:
+    if not same_steps(chosen.scenario, own.scenario):
         check_inputs(log, chosen.scenario)
     node = _estimator_of(chosen)
     recorded = recorded_estimates(log, node.topics.estimate)
@@ -91,10 +94,13 @@ def replay_link(log: Log, chosen: Link, own: Link) -> Replay:
         return _estimated_anew(chosen, node, feed(node, logged_events(log, node.subscribes)))
     index = index_by_digest(logged_events(log, node.subscribes))
     journey = refeed(node, node.topics.estimate, recorded, index)
-    if chosen != own:
+    if not same_steps(chosen.scenario, own.scenario):
         return _estimated_anew(chosen, node, journey)
-    estimates = parity_of(journey.repeated, node.topics.estimate, {})
-    return _with_commands(log, own, journey, estimates)
+    parity = {"estimates": parity_of(journey.repeated, node.topics.estimate, {})}
+    if chosen.scenario.estimator.certify and own.scenario.estimator.certify:
+        logged = [event.payload for event, _ in logged_events(log, [node.topics.certified])]
+        parity["certified"] = parity_beside(journey.outputs, node.topics.certified, logged)
+    return _with_commands(log, chosen, journey, parity)
 
 
 def replay_foreign(log: Log, chart: TopicMap) -> Replay:
@@ -125,13 +131,17 @@ def _estimator_of(link: Link) -> EstimatorNode:
 
 def _estimated_anew(link: Link, node: EstimatorNode, journey: Journey[EstimatorState]) -> Replay:
     if isinstance(node, ListeningEstimator):
-        estimates = tuple(smoothed_estimates(node))
+        smoothed = smoothed_estimates(node)
+        estimates, certified = smoothed.estimates, smoothed.certified
     else:
         estimates = _decoded(journey.outputs, msg.LeaderEstimate)
-    return Replay(link, estimates, (), journey.state, missing_inputs=journey.missing)
+        certified = _decoded(journey.outputs, msg.CertifiedEstimate)
+    return Replay(link, estimates, (), journey.state, missing_inputs=journey.missing, certified=certified)
 
 
-def _with_commands(log: Log, link: Link, estimator: Journey[EstimatorState], estimates: Parity) -> Replay:
+def _with_commands(
+    log: Log, link: Link, estimator: Journey[EstimatorState], parity: Mapping[str, Parity]
+) -> Replay:
     """Repeat the controller's life too. It is fed with the estimates as logged, so it is judged by itself."""
     node = controller_node(link)
     recorded = recorded_commands(log, node.topics.command)
@@ -146,10 +156,11 @@ def _with_commands(log: Log, link: Link, estimator: Journey[EstimatorState], est
         estimator=estimator.state,
         controller=journey.state,
         parity={
-            "estimates": estimates,
+            **parity,
             "commands": parity_of(journey.repeated, node.topics.command, {drive: sent}),
         },
         missing_inputs=estimator.missing + journey.missing,
+        certified=_decoded(estimator.outputs, msg.CertifiedEstimate),
     )
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from dataclasses import dataclass
 
 from msgspec.structs import replace
 
+from estimation.certified import Certain, Failed
 from estimation.estimate import estimate_of
 from estimation.measurement import Measurement
 from estimation.smoother import smooth
@@ -14,18 +15,23 @@ from hil.nodes.leader_filter import refuse_bias_states
 from hil.nodes.node import Event, Outgoing
 from hil.nodes.status_reasons import REASONS
 from hil.scenario.schema import Scenario
+from hil.wire.certified_message import certified_message
 from hil.wire.estimate_message import to_message
-from hil.wire.message_types import LeaderEstimate
+from hil.wire.message_types import CertifiedEstimate, LeaderEstimate
 
 
 class ListeningEstimator(EstimatorNode):
-    """The EKF's node, which keeps the measurements of its whole life, by capture time, beside its state."""
+    """The EKF's node, which keeps the measurements of its whole life, by capture time, beside its state.
+
+    Where estimates are certified it keeps what was certain at each, too.
+    """
 
     def __init__(self, scenario: Scenario, name: str = NAME, others: frozenset[str] = frozenset()) -> None:
         refuse_bias_states(scenario)
         ekf = replace(scenario, estimator=replace(scenario.estimator, kind="ekf"))
         super().__init__(ekf, name, others)
         self.measurements: dict[int, Measurement] = {}
+        self.certain: dict[int, Certain | Failed] = {}
 
     def step(
         self, state: EstimatorState, event: Event, now_ns: int
@@ -34,18 +40,34 @@ class ListeningEstimator(EstimatorNode):
         after, sent = super().step(state, event, now_ns)
         if after.track is not state.track:
             self.measurements |= {point.measurement.capture_ns: point.measurement for point in after.track}
+            if self.certifying is not None and after.track:
+                newest_ns = after.track[-1].measurement.capture_ns
+                known = self.certifying.certain(after.believed, after.own.history, newest_ns)
+                self.certain[newest_ns] = known
         return after, sent
 
 
-def smoothed_estimates(node: ListeningEstimator) -> Iterable[LeaderEstimate]:
-    """Estimates at all captures, in their order, each resting on the whole log.
+@dataclass(frozen=True, slots=True)
+class Smoothed:
+    """Estimates at all captures, in their order, and the certified ones where they were asked for."""
+
+    estimates: tuple[LeaderEstimate, ...]
+    certified: tuple[CertifiedEstimate, ...]
+
+
+def smoothed_estimates(node: ListeningEstimator) -> Smoothed:
+    """Estimates that each rest on the whole log; what is certain of them, on what came before.
 
     They are stamped as computed at their capture, as a smoother knows no delay.
     """
+    estimates, certified = [], []
     for point in smooth(node.tracker, node.measurements.values()):
         measurement = point.measurement
-        status = node.tracker.status((point,), measurement.capture_ns)
+        capture_ns, frame_id = measurement.capture_ns, node.topics.follower
+        status = node.tracker.status((point,), capture_ns)
         estimate = estimate_of(point.belief, measurement, status, point.nis, point.used_ns)
-        yield to_message(
-            estimate, measurement.capture_ns, node.topics.follower, REASONS[status], node.assumed, ()
-        )
+        estimates.append(to_message(estimate, capture_ns, frame_id, REASONS[status], node.assumed, ()))
+        if node.certifying is not None:
+            certain = node.certain.get(capture_ns, Failed.UNSEEN)
+            certified.append(certified_message(estimate, certain, capture_ns, frame_id))
+    return Smoothed(tuple(estimates), tuple(certified))

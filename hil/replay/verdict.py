@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from hil.errors import UsageError
+from hil.judge.certified import certified_violations
 from hil.judge.evidence import Evidence, evidence_of_link, evidence_of_log
 from hil.log.metadata import IMPORT, mode_of
 from hil.log.reader import Log
@@ -15,6 +16,8 @@ from hil.replay.rerun import Replay
 from hil.scenario.links import Link
 from hil.wire.message_types import LeaderEstimate
 from hil.wire.messages import to_ns
+
+_CALLED = {"certified": "certified estimates"}
 
 
 def evidence_of_replay(
@@ -36,6 +39,7 @@ def evidence_of_replay(
         mode="replay",
         estimates=played.estimates,
         commands=played.commands,
+        certified=played.certified,
         taken=played.estimator.taken,
         refused=played.estimator.refused,
         zero_ns=zero_ns,
@@ -69,7 +73,8 @@ def evaluated(evidence: Evidence) -> list[LeaderEstimate]:
 def parity_json(*played: Replay) -> dict[str, Any]:
     """Counts of the comparison as the summary has them, over all followers that were replayed."""
     nothing = Parity(0, 0)
-    counts = {name: [each.parity.get(name, nothing) for each in played] for name in ("estimates", "commands")}
+    names = ["estimates", "commands"] + ["certified"] * any("certified" in each.parity for each in played)
+    counts = {name: [each.parity.get(name, nothing) for each in played] for name in names}
     return {
         name: {
             "compared": sum(parity.compared for parity in parities),
@@ -86,7 +91,7 @@ def why_not_same(log: Log, played: Replay) -> str:
     if not compared:
         return f"log {log.path}: holds no estimates{whose}, so there is nothing to verify"
     wrong = [
-        f"{parity.mismatched} of {parity.compared} {name}{whose} differ "
+        f"{parity.mismatched} of {parity.compared} {_CALLED.get(name, name)}{whose} differ "
         f"(the first is number {parity.first + 1})"
         for name, parity in played.parity.items()
         if parity.first is not None
@@ -99,6 +104,7 @@ def why_not_same(log: Log, played: Replay) -> str:
 
 
 def violated_bounds(summary: Mapping[str, Any]) -> dict[str, int]:
-    """Extended bounds that samples of the evaluation lie outside of, with the number of samples."""
+    """Extended bounds and certified radii that samples lie outside of, with how many do."""
     violations = summary.get("bounds", {}).get("violations", {})
-    return {name: count for name, count in violations.items() if name.endswith("_extended") and count}
+    broken = {name: count for name, count in violations.items() if name.endswith("_extended") and count}
+    return broken | certified_violations(summary)

@@ -208,6 +208,7 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``speed_bandwidth``: q_v = speed_bandwidth * k_v^2 per second (0.01 for leaders that drive evenly, 0.1
     for those that stop and go every few seconds).
     ``align_odometry``: odometry is corrected by the delay and scales that the follower's mocap track shows.
+    ``certify``: publish a guaranteed error radius of v1 and alpha1 beside every estimate.
     ``kind`` smoother is for replays only.
     """
 
@@ -238,6 +239,7 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     lost_after_s: Positive = 1.0
     window_s: NonNegative = 0.2
     difference_cutoff_s: Positive = 0.1
+    certify: bool = False
 
 
 class ChainSection(_Section, frozen=True, kw_only=True):

@@ -110,6 +110,21 @@ class LeaderEstimate:
 
 
 @dataclass(slots=True)
+class CertifiedEstimate:
+    """An estimate with guaranteed error radii, both NaN where ``failed`` names a premise that failed."""
+
+    header: Header
+    computed: Time
+    v1: float
+    radius_v1: float
+    alpha1: float
+    radius_alpha1: float
+    measurements: int
+    failed: str
+    __msgtype__: ClassVar[str] = "abreast_msgs/msg/CertifiedEstimate"
+
+
+@dataclass(slots=True)
 class Command:
     """A controller's decision and what it rests on; the robot itself gets a ``TwistStamped`` or ``Twist``."""
 
@@ -172,6 +187,7 @@ OWN_TYPES: tuple[type[Message], ...] = (
     RigidBodies,
     Consumed,
     LeaderEstimate,
+    CertifiedEstimate,
     Command,
     Truth,
     RangeBearing,

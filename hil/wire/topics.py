@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from hil.scenario.links import Link, links_of
 from hil.scenario.schema import Scenario
 from hil.wire.message_types import (
+    CertifiedEstimate,
     Command,
     DiagnosticArray,
     LeaderEstimate,
@@ -68,6 +69,11 @@ class Topics:
         return f"{self.follower}/leader_estimate"
 
     @property
+    def certified(self) -> str:
+        """The same with guaranteed error radii, where ``estimator.certify`` asks for them."""
+        return f"{self.follower}/certified"
+
+    @property
     def command(self) -> str:
         """The controller's decision with its reasons."""
         return f"{self.follower}/command"
@@ -89,6 +95,7 @@ class Topics:
             self.cmd_vel: typename_of(drive),
             self.sighting: typename_of(RangeBearing),
             self.estimate: typename_of(LeaderEstimate),
+            self.certified: typename_of(CertifiedEstimate),
             self.command: typename_of(Command),
             self.side: typename_of(String),
             self.truth: typename_of(Truth),

@@ -16,6 +16,7 @@ from hil.log.reader import Log, read_log
 from hil.nodes.lockstep_run import run_lockstep
 from hil.scenario.files import load_scenario
 from hil.wire.message_types import (
+    CertifiedEstimate,
     Command,
     Consumed,
     DiagnosticArray,
@@ -90,6 +91,9 @@ def sample_messages() -> dict[str, Message]:
         "follower/cmd_vel": TwistStamped(header=stamp, twist=twist),
         "leader/cmd_vel": twist,
         "follower/leader_estimate": estimate,
+        "follower/certified": CertifiedEstimate(
+            stamp, to_time(STAMP_NS + 1), 0.08, float("nan"), -1.6, 0.25, 53, "größer"
+        ),
         "follower/command": Command(
             stamp, to_time(1), to_time(2), 0.1, 0.2, float("nan"), 0.4, True, "stale", False, consumed
         ),

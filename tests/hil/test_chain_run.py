@@ -48,7 +48,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Results of ``abreast run`` of a chain of three in lockstep."""
     out = tmp_path_factory.mktemp("chain") / "out"
     options = [word for each in GIVEN for word in ("--set", each)]
-    result = abreast("run", "chain5-turtlebot3", "--lockstep", "--out", str(out), *options)
+    result = abreast("run", "chain5-turtlebot3", "--lockstep", "--certify", "--out", str(out), *options)
     assert result.code == 0, result.stderr
     assert "all at their station" in result.stderr
     return out
@@ -67,6 +67,7 @@ def test_a_chain_leaves_log_summary_and_picture(folder: Path) -> None:
         assert pair["v_peak"] < 0.22
         assert pair["estimation"]["rmse"]["v1"] < 0.01
         assert sum(pair["bounds"]["violations"][name] for name in ("v1_extended", "alpha1_extended")) == 0
+        assert [pair["certified"][name]["violations"] for name in ("v1", "alpha1")] == [0, 0]
         # The other robots of the chain are no strangers to it.
         assert "unknown_body" not in pair.get("rejected", {})
 
@@ -86,7 +87,8 @@ def test_every_follower_repeats_bit_for_bit(folder: Path) -> None:
     result = abreast("replay", str(folder / "run.mcap"), "--verify", "--json")
     assert result.code == 0, result.stderr
     found = json.loads(result.stdout)
-    assert [found["parity"][name]["mismatched"] for name in ("estimates", "commands")] == [0, 0]
+    assert [found["parity"][name]["mismatched"] for name in ("estimates", "commands", "certified")] == [0] * 3
+    assert found["parity"]["certified"]["compared"] == found["parity"]["estimates"]["compared"]
     assert [pair["parity"]["estimates"]["compared"] > 300 for pair in found["pairs"]] == [True, True]
 
 

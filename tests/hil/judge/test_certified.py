@@ -5,41 +5,70 @@ from dataclasses import replace
 import pytest
 
 from hil.errors import UsageError
-from hil.judge.certified import judge_certified
-from hil.judge.evidence import evidence_of_log
+from hil.judge.certified import certified_violations
+from hil.judge.evidence import Evidence
+from hil.judge.summary import summarise
 from hil.log.reader import Log
-from hil.scenario.files import with_overrides
+from hil.replay.rerun import replay
+from hil.replay.verdict import evidence_of_replay
+from hil.scenario.certify import CERTIFY
+from hil.scenario.files import load_scenario, with_overrides
 
 
-def test_no_error_of_a_run_exceeds_its_certified_radius(short_log: Log) -> None:
-    found = judge_certified(short_log, evidence_of_log(short_log))
-    assert found["certified"] > 100
-    assert found["contradicted"] == 0
+def certified(log: Log, *overrides: str) -> Evidence:
+    """Evidence of a log whose estimates are certified afterwards."""
+    scenario = load_scenario("turtlebot3", ("run.seed=7", "run.duration_s=6.0", "run.evaluate_from_s=3.0"))
+    given = with_overrides(scenario, ["mocap.loss=0.05", *overrides, CERTIFY])
+    return evidence_of_replay(log, replay(log, given))
+
+
+@pytest.fixture(scope="module")
+def evidence(short_log: Log) -> Evidence:
+    return certified(short_log)
+
+
+def test_no_error_of_a_run_exceeds_its_certified_radius(evidence: Evidence) -> None:
+    found = summarise(evidence)["certified"]
+    assert found["certified"] > 300
+    assert "failed" not in found
     for name, worst in (("v1", 0.06), ("alpha1", 1.0)):
         assert found[name]["violations"] == 0
         assert 0.0 < found[name]["tightness"] <= 1.0
         assert found[name]["median"] <= found[name]["largest"] < worst
 
 
-def test_an_estimate_that_is_far_off_has_a_radius_that_reaches_the_truth(short_log: Log) -> None:
-    """The certificate holds whatever the filter does."""
-    evidence = evidence_of_log(short_log)
-    wild = [replace(each, v1=each.v1 + 0.5, alpha1=each.alpha1 + 1.0) for each in evidence.estimates]
-    found = judge_certified(short_log, replace(evidence, estimates=wild))
-    assert found["v1"]["violations"] == found["alpha1"]["violations"] == 0
-    assert found["v1"]["tightness"] > 0.9
-    assert found["v1"]["median"] > 0.45
+def test_certifying_leaves_estimates_and_commands_as_they_were(short_log: Log, evidence: Evidence) -> None:
+    plain = replay(short_log)
+    assert plain.mismatched == 0
+    assert len(plain.estimates) == len(evidence.estimates) == len(evidence.certified)
+    assert len(plain.commands) == len(evidence.commands)
+    told = [(each.header.stamp, each.computed, each.v1, each.alpha1) for each in evidence.estimates]
+    assert told == [(each.header.stamp, each.computed, each.v1, each.alpha1) for each in evidence.certified]
 
 
-def test_too_small_a_noise_bound_is_found_out(short_log: Log) -> None:
-    evidence = evidence_of_log(short_log)
-    tight = ["mocap.sigma_position=1e-5", "estimator.sigma_position=1e-5"]
-    found = judge_certified(short_log, replace(evidence, scenario=with_overrides(evidence.scenario, tight)))
-    assert found["contradicted"] > 100
+def test_errors_beyond_a_radius_are_counted(evidence: Evidence) -> None:
+    wild = [replace(each, v1=each.v1 + 0.5) for each in evidence.certified]
+    found = summarise(replace(evidence, certified=wild))
+    assert found["certified"]["v1"]["tightness"] > 5.0
+    assert certified_violations(found) == {"v1_certified": found["certified"]["certified"]}
 
 
-def test_the_body_front_end_has_no_positions_to_certify_with(short_log: Log) -> None:
-    evidence = evidence_of_log(short_log)
-    body = with_overrides(evidence.scenario, ["estimator.front_end=body"])
-    with pytest.raises(UsageError, match="front_end"):
-        judge_certified(short_log, replace(evidence, scenario=body))
+def test_premises_that_fail_are_counted_by_name(short_log: Log) -> None:
+    """A leader that is faster than it is said to be is found out, and no radius is made up."""
+    found = summarise(certified(short_log, "leader.k_v=0.06"))["certified"]
+    assert found["failed"]["noise"] > 100
+    assert found["certified"] + sum(found["failed"].values()) > 300
+
+
+def test_without_truth_radii_are_told_and_nothing_is_judged(evidence: Evidence) -> None:
+    found = summarise(replace(evidence, truth=[], motion_since_ns=None))["certified"]
+    assert set(found["v1"]) == {"median", "largest"}
+
+
+def test_logs_without_certified_estimates_have_no_such_part(short_log: Log) -> None:
+    assert "certified" not in summarise(evidence_of_replay(short_log, replay(short_log)))
+
+
+def test_too_coarse_a_body_front_end_is_refused(short_log: Log) -> None:
+    with pytest.raises(UsageError, match="range, bearing and odometry leave the leader's velocity uncertain"):
+        certified(short_log, "estimator.front_end=body")

@@ -63,7 +63,7 @@ def commands(log: Path, topic: str = COMMAND) -> list[tuple[float, msg.Command]]
 
 
 def test_a_run_estimates_drives_stops_and_leaves_nothing_behind(start: Callable[..., Run]) -> None:
-    run = start("--set", "run.evaluate_from_s=2.0")
+    run = start("--certify", "--set", "run.evaluate_from_s=2.0")
     code, summary, err = run.finish()
     assert code == 0, err
     assert run.daemons() == {}
@@ -72,6 +72,9 @@ def test_a_run_estimates_drives_stops_and_leaves_nothing_behind(start: Callable[
     assert summary["commands"]["sent"] > 300
     assert summary["estimation"]["rmse"]["v1"] < 0.01
     assert summary["bounds"]["violations"]["v1_extended"] == 0
+    assert summary["certified"]["certified"] > 100
+    assert summary["certified"]["v1"]["violations"] == summary["certified"]["alpha1"]["violations"] == 0
+    assert read_log(run.log).topics["follower/certified"] == "abreast_msgs/msg/CertifiedEstimate"
     assert summary["latency_ms"]["capture_to_command"]["p50"] > 30.0
     assert {path.name for path in run.folder.iterdir()} == {
         "run.mcap",

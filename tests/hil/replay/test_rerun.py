@@ -12,7 +12,9 @@ from hil.log.reader import Log, Record, read_log
 from hil.log.writer import LogWriter
 from hil.nodes.lockstep import EPOCH_NS
 from hil.nodes.lockstep_run import run_lockstep
+from hil.replay.journal import Parity
 from hil.replay.rerun import Replay, replay
+from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario, with_overrides
 from hil.wire import topics
 from hil.wire.message_types import Malformed
@@ -111,6 +113,36 @@ def test_a_flipped_bit_is_found(
     assert found[0] == expected[0]
     assert found[1] >= expected[1]
     assert replay(bad).parity["estimates" if expected[0] else "commands"].first is not None
+
+
+@pytest.fixture(scope="module")
+def certified_log(tmp_path_factory: pytest.TempPathFactory) -> Log:
+    return lockstep_log(tmp_path_factory.mktemp("certified"), *ROUGH, CERTIFY)
+
+
+def test_certified_estimates_come_out_again_bit_for_bit(certified_log: Log, tmp_path: Path) -> None:
+    topic = "follower/certified"
+    played = replay(certified_log)
+    logged = sum(1 for _ in certified_log.records([topic]))
+    assert played.parity["certified"] == Parity(logged, 0)
+    assert logged == played.parity["estimates"].compared == len(played.certified) > 100
+    bad = rewritten(certified_log, tmp_path / "bad.mcap", nth(topic, 100, flipped(44)))
+    found = replay(bad).parity
+    assert (found["certified"].mismatched, found["certified"].first) == (1, 100)
+    assert found["estimates"].mismatched == found["commands"].mismatched == 0
+    missing = rewritten(certified_log, tmp_path / "missing.mcap", nth(topic, 100, lambda record: None))
+    assert replay(missing).parity["certified"] == Parity(logged - 1, 0, None, 1)
+
+
+def test_a_log_is_verified_with_and_without_certified_estimates(certified_log: Log, rough_log: Log) -> None:
+    """They stand beside the rest: asked for afterwards, or no longer, all else is the same."""
+    for log, asked in ((rough_log, "true"), (certified_log, "false")):
+        own = scenario_of(log)
+        assert own is not None
+        played = replay(log, with_overrides(own, [f"estimator.certify={asked}"]))
+        assert mismatches(played) == (0, 0)
+        assert "certified" not in played.parity
+        assert bool(played.certified) == (asked == "true")
 
 
 @pytest.mark.parametrize("topic", ["follower/leader_estimate", "follower/command"])

@@ -22,6 +22,7 @@ import hil.wire.messages as messages_module
 from hil.errors import UsageError
 from hil.wire.message_types import (
     OWN_TYPES,
+    CertifiedEstimate,
     Command,
     Consumed,
     Header,
@@ -85,11 +86,13 @@ estimates = st.builds(
 commands = st.builds(
     Command, headers, times, times, *[floats] * 4, st.booleans(), texts, st.booleans(), consumed
 )
+certified = st.builds(CertifiedEstimate, headers, times, *[floats] * 4, st.integers(0, 2**32 - 1), texts)
 truths = st.builds(Truth, headers, st.integers(0, 2**32 - 1), *[floats] * 10)
 messages: st.SearchStrategy[Message] = st.one_of(
     rigid_bodies,
     estimates,
     commands,
+    certified,
     truths,
     st.builds(RangeBearing, headers, floats, floats),
     st.builds(Malformed, headers, texts, payloads),

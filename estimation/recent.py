@@ -1,0 +1,45 @@
+"""What was measured of late, by capture time, as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from formation.angles import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recent:
+    """Measured ``values`` of shape (n, k) at increasing ``capture_ns`` (n,)."""
+
+    capture_ns: NDArray[np.int64]
+    values: FloatArray
+
+    def ends_at(self, capture_ns: int) -> bool:
+        """Whether the newest measurement is of this capture time."""
+        return len(self.capture_ns) > 0 and int(self.capture_ns[-1]) == capture_ns
+
+
+NOTHING_RECENT = Recent(np.empty(0, dtype=np.int64), np.empty((0, 0)))
+
+
+def with_recent(recent: Recent, capture_ns: int, values: Sequence[float], span_ns: int) -> Recent:
+    """One measurement more at its place, and none that is older than the newest by more than the span.
+
+    Of two with the same capture time the first stays.
+    """
+    times = recent.capture_ns
+    if len(times) == 0:
+        return Recent(np.array([capture_ns]), np.array([values], dtype=np.float64))
+    place = int(np.searchsorted(times, capture_ns))
+    if place < len(times):
+        if times[place] == capture_ns or capture_ns < times[-1] - span_ns:
+            return recent
+        return Recent(np.insert(times, place, capture_ns), np.insert(recent.values, place, values, axis=0))
+    first = int(np.searchsorted(times, capture_ns - span_ns))
+    return Recent(
+        np.concatenate((times[first:], (capture_ns,))), np.concatenate((recent.values[first:], (values,)))
+    )

@@ -1,0 +1,91 @@
+"""How a scenario's estimates are certified: by the frames or sightings that its estimator believed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from estimation.certified import Certain, Failed
+from estimation.certified_positions import PositionCertifier
+from estimation.certified_sightings import SightingCertifier, SightingErrors, velocity_error
+from estimation.guarantees import leader_acceleration
+from estimation.inputs import History
+from estimation.measurement import Measurement
+from estimation.recent import NOTHING_RECENT, Recent
+from hil.errors import UsageError
+from hil.scenario.noise_bounds import NOISE_SIGMAS, position_bound
+from hil.scenario.schema import Scenario
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Believed:
+    """Measurements of late that the estimator believed: frames and, on the body front end, sightings."""
+
+    frames: Recent = NOTHING_RECENT
+    sightings: Recent = NOTHING_RECENT
+
+
+class Certifying:
+    """Keeps what was believed and says what that makes certain. Holds no state of its own between calls.
+
+    Raises :class:`UsageError` for a body front end whose sensor and odometry are too coarse to guarantee
+    anything that the leader's limits do not.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        leader, step = scenario.leader, 1.0 / scenario.mocap.rate_hz
+        A, speeds = float(leader_acceleration(leader.k_v, leader.k_u)), (leader.v_eps, leader.k_v)
+        self.by_frames = PositionCertifier(position_bound(scenario), A, speeds, step)
+        self.by_sightings: SightingCertifier | None = None
+        if scenario.estimator.front_end == "body":
+            _refuse_coarse(scenario, A)
+            rho, v2 = scenario.formation.rho_0, scenario.controller.v_max
+            delay = scenario.estimator.input_delay_s
+            self.by_sightings = SightingCertifier(_errors(scenario), A, speeds, rho, v2, step, delay)
+
+    def heard(self, believed: Believed, measurement: Measurement) -> Believed:
+        """What is believed with one measurement more: a frame, or a sighting on the body front end."""
+        capture_ns, seen = measurement.capture_ns, measurement.seen
+        if seen is not None:
+            follower = (seen.follower.x, seen.follower.y)
+            frames = self.by_frames.add(believed.frames, capture_ns, seen.leader, follower)
+            return replace(believed, frames=frames)
+        if self.by_sightings is None:
+            return believed
+        x, y = measurement.position.tolist()
+        rho, alpha2 = math.hypot(x, y), math.atan2(y, x)
+        return replace(believed, sightings=self.by_sightings.add(believed.sightings, capture_ns, rho, alpha2))
+
+    def certain(self, believed: Believed, odometry: History, capture_ns: int) -> Certain | Failed:
+        """What is certain at the capture time of an estimate, by the newest frame or sighting."""
+        if self.by_sightings is not None and believed.sightings.ends_at(capture_ns):
+            return self.by_sightings.certain(believed.sightings, odometry, capture_ns)
+        return self.by_frames.certain(believed.frames, capture_ns)
+
+
+def certifying(scenario: Scenario) -> Certifying | None:
+    """What certifies a scenario's estimates, None if it does not ask for that; raises as the class does."""
+    return Certifying(scenario) if scenario.estimator.certify else None
+
+
+def _errors(scenario: Scenario) -> SightingErrors:
+    given = scenario.estimator
+    sigmas = (given.sigma_range, given.sigma_bearing, given.sigma_v2, given.sigma_u2)
+    return SightingErrors(*(NOISE_SIGMAS * sigma for sigma in sigmas))
+
+
+def _refuse_coarse(scenario: Scenario, A: float) -> None:
+    given, leader, rho = scenario.estimator, scenario.leader, scenario.formation.rho_0
+    instead = 'set it to false, or estimator.front_end to "world" where motion capture shows both robots'
+    if given.input_lag_s > 0.0:
+        raise UsageError(
+            f"estimator.certify: estimator.input_lag_s is {given.input_lag_s:g}, expected 0: commands that "
+            f"stand in for odometry tell motion within no bound; {instead}"
+        )
+    error = velocity_error(_errors(scenario), A, rho, scenario.controller.v_max)
+    if error >= leader.k_v:
+        raise UsageError(
+            f"estimator.certify: errors of {NOISE_SIGMAS:g} sigma of range, bearing and odometry leave the "
+            f"leader's velocity uncertain by {error:.3g} m/s at {rho:g} m, expected less than leader.k_v = "
+            f"{leader.k_v:g} m/s, which is known anyway; {instead}"
+        )
