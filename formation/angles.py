@@ -33,8 +33,10 @@ def wrap(angle: float | FloatArray) -> float | FloatArray:
 
 
 def _wrap_array(angle: FloatArray) -> FloatArray:
-    with np.errstate(invalid="ignore"):
-        turned = np.fmod(angle, _TURN)
+    turned = angle
+    if not np.all(np.abs(angle) < _TURN):  # else the remainder would change nothing, and takes its time
+        with np.errstate(invalid="ignore"):
+            turned = np.fmod(angle, _TURN)
     # Both shifts are exact: the operands are within a factor of two of each other (Sterbenz).
     turned = np.where(turned > math.pi, turned - _TURN, turned)
     return np.where(turned <= -math.pi, turned + _TURN, turned)

@@ -22,6 +22,7 @@ from hil.judge.noise_free_orbit import NoiseFreeOrbit, noise_free_orbit
 from hil.judge.true_states import TrueStates
 from hil.scenario.files import build_scenario, scenario_text, with_overrides
 from hil.scenario.schema import Scenario
+from hil.sweep import engine_kernels as kernels
 from hil.sweep.engine import Engine, Flight, evaluation_ns
 
 BOUNDS = tuple(QUANTITY_OF)
@@ -89,41 +90,52 @@ def judge_run(
 
 
 def _columns(engine: Engine, flight: Flight) -> Columns:
-    """The run as the judge sees it, its time counted from when the leader set off."""
+    """The run as the judge sees it, its time counted from when the leader set off; truth in the span only."""
     from_ns, to_ns = evaluation_ns(engine.scenario)
     run, span = Span(0, to_ns), Span(from_ns, to_ns)
-    truth = true_states(flight)
+    rows = _rows_inside(flight, span)
+    truth = true_states(flight, rows)
     estimates = _estimates(engine, flight)
     judged = inside(estimates.capture_ns, span) & (estimates.status == Status.TRACKING)
-    true = _rows(truth, flight.told["frame"][judged])
+    true = _rows(truth, flight.told["frame"][judged] - rows.start)
     commands = CommandColumns.of(())
     return Columns(run, span, estimates, commands, truth, estimates.only(judged), true)
 
 
+def _rows_inside(flight: Flight, span: Span) -> slice:
+    """Frames of a span, its ends included."""
+    captures_ns = flight.frames["at_ns"]
+    first = np.searchsorted(captures_ns, flight.since_ns + span.from_ns)
+    return slice(int(first), int(np.searchsorted(captures_ns, flight.since_ns + span.to_ns, side="right")))
+
+
 def _estimates(engine: Engine, flight: Flight) -> EstimateColumns:
     found = engine.estimates()
-    names = ("rho", "alpha2", "rho_dot", "alpha2_dot", "v1", "alpha1", "v2", "u2")
-    variances = np.column_stack([found[f"var_{name}"] for name in QUANTITIES])
+    # All of its fields are floats: one turn of the table gives every column.
+    columns = dict(zip(_FIELDS, found.view(np.float64).reshape(-1, len(_FIELDS)).T.copy(), strict=True))
+    variances = np.column_stack([columns[f"var_{name}"] for name in QUANTITIES])
     return EstimateColumns(
         capture_ns=flight.frames["at_ns"][flight.told["frame"]] - flight.since_ns,
         status=flight.told["status"].copy(),
-        seen=Perceived(*(found[name].copy() for name in names)),
-        u1=found["u1"].copy(),
+        seen=Perceived(*(columns[name] for name in _SEEN)),
+        u1=columns["u1"],
         nis=flight.told["nis"].copy(),
         sd=np.sqrt(np.maximum(variances, 0.0)),
     )
 
 
-def true_states(flight: Flight) -> TrueStates:
-    """The truth at every frame, its time counted from when the leader set off."""
-    told = {name: flight.frames[f"true_{name}"].copy() for name in _TOLD}
+def true_states(flight: Flight, rows: slice) -> TrueStates:
+    """The truth at frames, its time counted from when the leader set off."""
+    frames = flight.frames[rows]
+    told = {name: frames[f"true_{name}"].copy() for name in _TOLD}
     dx, dy = told["fx"] - told["lx"], told["fy"] - told["ly"]
-    rho, line = np.hypot(dx, dy), np.arctan2(dy, dx)
+    rho, line = np.sqrt(dx * dx + dy * dy), np.arctan2(dy, dx)
     leader, follower = wrap(told["lheading"]), wrap(told["fheading"])
-    alpha1, alpha2 = wrap(line - leader), wrap(np.arctan2(-dy, -dx) - follower)
-    turning = (told["v1"] * np.sin(alpha1) + told["v2"] * np.sin(alpha2)) / rho
+    alpha1, alpha2 = wrap(line - leader), wrap(line - follower + math.pi)
+    ahead, aside = told["v1"] * np.cos(alpha1), told["v1"] * np.sin(alpha1)
+    own_ahead, own_aside = told["v2"] * np.cos(alpha2), told["v2"] * np.sin(alpha2)
     return TrueStates(
-        capture_ns=flight.frames["at_ns"] - flight.since_ns,
+        capture_ns=frames["at_ns"] - flight.since_ns,
         leader=np.column_stack([told["lx"], told["ly"], leader]),
         follower=np.column_stack([told["fx"], told["fy"], follower]),
         v1=told["v1"],
@@ -133,11 +145,13 @@ def true_states(flight: Flight) -> TrueStates:
         rho=rho,
         alpha1=alpha1,
         alpha2=alpha2,
-        rho_dot=-told["v1"] * np.cos(alpha1) - told["v2"] * np.cos(alpha2),
-        alpha2_dot=turning - told["u2"],
+        rho_dot=-ahead - own_ahead,
+        alpha2_dot=(aside + own_aside) / rho - told["u2"],
     )
 
 
+_FIELDS = kernels.ESTIMATE.names or ()
+_SEEN = ("rho", "alpha2", "rho_dot", "alpha2_dot", "v1", "alpha1", "v2", "u2")
 _TOLD = ("lx", "ly", "lheading", "fx", "fy", "fheading", "v1", "u1", "v2", "u2")
 
 
@@ -157,11 +171,12 @@ def _add_errors(tally: NDArray[np.void], columns: Columns, errors: dict[str, Flo
 
 def _add_least(tally: NDArray[np.void], engine: Engine, flight: Flight, columns: Columns) -> None:
     """Posterior Cramer-Rao bound at every eighth sample, as in the summary of a single run."""
-    captures_ns = columns.truth.capture_ns
-    first = int(np.searchsorted(captures_ns, columns.span.from_ns - WARM_UP_NS))
-    wanted = np.zeros(len(captures_ns), dtype=np.bool_)
-    at_samples = np.searchsorted(captures_ns, np.unique(columns.samples.capture_ns))
-    wanted[at_samples[::EVERY]] = True
+    captures_ns, samples_ns = flight.frames["at_ns"], columns.samples.capture_ns
+    first = int(np.searchsorted(captures_ns, flight.since_ns + columns.span.from_ns - WARM_UP_NS))
+    others = np.flatnonzero(np.diff(samples_ns, prepend=-1))  # several may tell of one capture
+    rows = np.searchsorted(captures_ns, flight.since_ns + samples_ns[others[::EVERY]])
+    wanted = np.zeros(rows[-1] + 1, dtype=np.bool_)
+    wanted[rows] = True
     least = engine.least_variances(first, wanted)
     tally["best_count"] = least.count
     tally["best_sum"][0] = [least.count * least.variances[name] for name in QUANTITIES]
@@ -174,15 +189,14 @@ def _add_formation(
     orbit: NoiseFreeOrbit | None,
 ) -> None:
     truth = columns.truth
-    known = inside(truth.capture_ns, columns.span)
-    rho, alpha1 = truth.rho[known], truth.alpha1[known]
+    rho, alpha1 = truth.rho, truth.alpha1
     tally["moments"], tally["rho_min"], tally["rho_max"] = len(rho), rho.min(), rho.max()
     if allowed is not None:
         tally["inside"] = np.count_nonzero((rho >= allowed[0]) & (rho <= allowed[1]))
     if orbit is None:
         tally["rho_off_sum"] = tally["alpha1_off_sum"] = math.nan
         return
-    orbit_rho, orbit_alpha1, _ = orbit.at(truth.capture_ns[known])
+    orbit_rho, orbit_alpha1, _ = orbit.at(truth.capture_ns)
     tally["rho_off_sum"] = np.sum((rho - orbit_rho) ** 2)
     tally["alpha1_off_sum"] = np.sum(wrap(alpha1 - orbit_alpha1) ** 2)
 
@@ -202,5 +216,5 @@ def orbit_of(scenario: Scenario) -> NoiseFreeOrbit | None:
 @lru_cache(maxsize=4)
 def _orbit(text: str) -> NoiseFreeOrbit | None:
     scenario = build_scenario(tomllib.loads(text))
-    flight = Engine(scenario).fly(0)
-    return noise_free_orbit(scenario, true_states(flight), Span(0, evaluation_ns(scenario)[1]))
+    flight, run = Engine(scenario).fly(0), Span(0, evaluation_ns(scenario)[1])
+    return noise_free_orbit(scenario, true_states(flight, _rows_inside(flight, run)), run)
