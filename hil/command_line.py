@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import importlib
 import sys
 from collections.abc import Sequence
@@ -29,10 +28,6 @@ COMMANDS = {
 }
 _MODULES = {"import": "import_recording"}
 _DAEMONS = ("emulator", "estimator", "controller", "recorder")
-
-_SELDOM = (50_000, 20, 20)
-"""Thresholds of the garbage collector: with the usual ones it takes a quarter of the time of a start, of a
-verdict and of a report, and finds nothing."""
 
 
 class _LazyGroup(click.Group):
@@ -64,7 +59,6 @@ def abreast() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the console script and exit: 0 done, 1 a check failed, 2 bad usage or bad input."""
-    gc.set_threshold(*_SELDOM)
     try:
         code = abreast.main(
             args=None if arguments is None else list(arguments), prog_name="abreast", standalone_mode=False

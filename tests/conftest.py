@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import gc
 import os
 
 import pytest
 from hypothesis import settings
 
 # The same examples every time, so that a red test is a change; HYPOTHESIS_PROFILE=explore looks for new ones.
-settings.register_profile("repeat", derandomize=True, deadline=None)
+settings.register_profile("repeat", derandomize=True, deadline=None, max_examples=60)
 settings.register_profile("explore", deadline=None, max_examples=1000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeat"))
-
-# A worker holds all that the tests import: looking through it for garbage again and again takes a fifth of
-# the time of all tests.
-gc.set_threshold(50_000, 20, 20)
 
 SLOWEST = (
     "tests/hil/live/test_run.py",

@@ -17,7 +17,6 @@ from hil.wire.message_types import String
 from hil.wire.pubsub import Wire
 from hil.wire.session import Endpoints, close_session, open_session
 
-_OFTEN = (700, 10, 10)
 _LONGEST_WAIT = 0.1
 _LINGER = 0.05
 
@@ -142,9 +141,7 @@ def run_daemon(
         worker.begin(time.time_ns())
         wire.subscribe(worker.subscribes)
         # What is loaded by now stays for good; walking it again would halt a live step for 100 ms and more.
-        # From here on garbage is collected little by little.
         gc.freeze()
-        gc.set_threshold(*_OFTEN)
         on_ready()
         until = None if duration_s is None else time.monotonic() + duration_s
         while not ending.asked and (until is None or time.monotonic() < until):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -119,7 +118,9 @@ def moved(measurement: Measurement, dx: float, dy: float) -> Measurement:
 
 
 @pytest.mark.parametrize(("kind", "front_end"), CASES)
-@pytest.mark.parametrize(("bearing", "heading"), list(itertools.product((-2.8, -0.7, 1.5), (-2.0, 0.1, 3.1))))
+@pytest.mark.parametrize(
+    ("bearing", "heading"), [(-2.8, -2.0), (-2.8, 3.1), (-0.7, 0.1), (1.5, -2.0), (1.5, 3.1)]
+)
 def test_from_no_knowledge_it_settles_wherever_the_leader_is_and_goes(
     kind: str, front_end: FrontEnd, bearing: float, heading: float
 ) -> None:
