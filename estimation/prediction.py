@@ -24,12 +24,15 @@ class SentCommand:
     u: float
 
 
-def predict_shape(estimate: Estimate, commands: Sequence[SentCommand], until_ns: int, lag: float) -> Shape:
+def predict_shape(
+    estimate: Estimate, commands: Sequence[SentCommand], until_ns: int, lag: float, further: float = 0.0
+) -> Shape:
     """Shape of the pair at ``until_ns``, from the estimate at its capture time.
 
-    The leader goes on with its estimated v1 and u1. The follower starts with its measured v2, u2 and follows
-    the commands, given in order of time, through actuators of first-order ``lag`` [s]; before the first of
-    them it keeps its motion, after the last this one goes on.
+    The leader goes on with its estimated v1 and u1, and turns by ``further`` [rad], evenly on its way, beyond
+    that (:meth:`estimation.foresight.Foresight.further`). The follower starts with its measured v2, u2 and
+    follows the commands, given in order of time, through actuators of first-order ``lag`` [s]; before the
+    first of them it keeps its motion, after the last this one goes on.
     """
     follower = Pose(0.0, 0.0, 0.0)
     x, y = estimate.rho * math.cos(estimate.alpha2), estimate.rho * math.sin(estimate.alpha2)
@@ -37,7 +40,7 @@ def predict_shape(estimate: Estimate, commands: Sequence[SentCommand], until_ns:
     total = (until_ns - estimate.capture_ns) * _NS
     if total <= 0.0:
         return Shape(estimate.rho, estimate.alpha1, estimate.alpha2)
-    leader = advance(leader, estimate.v1, estimate.u1, total)
+    leader = advance(leader, estimate.v1, estimate.u1 + further / total, total)
     v, u = estimate.v2, estimate.u2
     for dt, command in _segments(estimate.capture_ns, until_ns, commands):
         goal_v, goal_u = (v, u) if command is None else (command.v, command.u)

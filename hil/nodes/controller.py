@@ -8,12 +8,12 @@ from dataclasses import replace as with_changes
 from msgspec import Struct, field
 from msgspec.structs import replace
 
-from controllers.feedforward import TurnTrend
 from controllers.guard import Decision, decide
 from controllers.resolution import NOTHING_OWED, Resolution
 from controllers.side_change import gentle
 from controllers.station_keeper import Keeping
 from estimation.estimate import Estimate
+from estimation.foresight import TurnTrend
 from estimation.prediction import SentCommand, predict_shape
 from estimation.tracking import Status
 from formation.pose import Motion
@@ -53,8 +53,8 @@ class ControllerState(Struct, frozen=True):
     ``estimate``: the newest one that may move the robot; ``status``: of the newest one of any kind.
     ``sent``: commands since that estimate's capture, oldest first, and the one before. ``leader_u1``: the
     turn rate that the leader was told to drive, kept for the law ``ideal``, nan before it is known.
-    ``trend``: of the estimated turn rate, kept for the laws that feed it forward. ``keeping``: the side that
-    was ordered. ``owed``: what rounding to the robot's steps took off the last command, of ``commanded_ns``.
+    ``trend``: of the estimated turn rate. ``keeping``: the side that was ordered. ``owed``: what rounding to
+    the robot's steps took off the last command, of ``commanded_ns``.
     """
 
     keeping: Keeping
@@ -188,8 +188,9 @@ class ControllerNode:
         if estimate is not None:
             age = (now_ns - estimate.measured_ns) * _NS
             if age <= self.max_age and _can_be(estimate):
-                shape = predict_shape(estimate, state.sent, now_ns + self.ahead_ns, self.lag)
                 ahead = self._ahead(estimate, now_ns)
+                further = self.leader_turn.further(state.trend, ahead)
+                shape = predict_shape(estimate, state.sent, now_ns + self.ahead_ns, self.lag, further)
                 u1 = self.leader_turn.when_acting(state.leader_u1, state.trend, ahead)
                 elapsed = min(max(now_ns - state.commanded_ns, _SHORTEST_STEP_NS), self.tick_ns) * _NS
                 seen = Motion(estimate.v1, estimate.u1)

@@ -1,4 +1,4 @@
-"""From a scenario's plain values to the objects of ``formation`` and ``controllers`` that they stand for.
+"""From a scenario's plain values to the objects of the pure packages that they stand for.
 
 A value that the schema lets through but that makes no sense (a table whose times run backwards, two robots in
 one place) is answered here, with a :class:`~hil.errors.UsageError` that names the scenario.
@@ -6,10 +6,10 @@ one place) is answered here, with a :class:`~hil.errors.UsageError` that names t
 
 from __future__ import annotations
 
-from controllers.feedforward import Foresight
 from controllers.laws import LAWS, Gains
 from controllers.limits import Limits
 from controllers.station_keeper import StationKeeper
+from estimation.foresight import Foresight
 from estimation.motion import LeaderLimits, ProcessNoise
 from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
 from formation.spacing import Spacing

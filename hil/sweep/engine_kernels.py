@@ -52,6 +52,7 @@ _FULL_NOISE_SPEED, _FULL_NOISE_TURN = 0.05, 0.2
 _TRACK, _CANDIDATE, _PRIOR, _OTHER_PRIOR = 0, 1, 2, 3
 _BELIEVED, _FOLLOWER, _FLIPPED, _SWAPPED, _FROZEN = 0, 1, 2, 3, 4
 _SLIP = 0.1
+_LEFT_OF_HEADING, _ERRORS_TOGETHER = 25.0 / 36.0, 1.5
 
 
 def _fields(stamps: str, numbers: str) -> np.dtype[np.void]:
@@ -914,8 +915,7 @@ def _tell_controller(
     dx, dy, c, s = b.x - pose.x, b.y - pose.y, pose.cos, pose.sin
     loop.x, loop.y = c * dx + s * dy, c * dy - s * dx
     loop.vx, loop.vy = c * b.vx + s * b.vy, c * b.vy - s * b.vx
-    if rules.law in (FEEDFORWARD, FADED):
-        _follow_trend(loop, rules, b, now_ns)
+    _follow_trend(loop, rules, b, now_ns)
     loop.u1, loop.var_u1, loop.v2, loop.u2 = b.u, b.u_u, frame.v2, frame.u2
     loop.known, loop.capture_ns, loop.measured_ns = 1, loop.track_ns, loop.used_ns
 
@@ -1001,6 +1001,17 @@ def _law(
 
 
 @_compiled()
+def _further(loop: Record, rules: Record, ahead: float) -> float:
+    """By how much the leader will have turned further than by its estimated u1 (``Foresight.further``)."""
+    if rules.law == FEEDFORWARD:
+        return 0.0
+    held = loop.var_u1 + rules.q_u * ahead
+    share = max(0.0, 1.0 - _LEFT_OF_HEADING * held / rules.spread)
+    angle: float = share * (loop.u1 - loop.slow_u1) * held / rules.q_u
+    return angle
+
+
+@_compiled()
 def _wanted(loop: Record, rules: Record, sent: int, arcs: int, now_ns: int) -> tuple[float, float]:
     """Predict the shape to when the command acts, and ask the law."""
     v1 = math.sqrt(loop.vx * loop.vx + loop.vy * loop.vy)
@@ -1011,7 +1022,8 @@ def _wanted(loop: Record, rules: Record, sent: int, arcs: int, now_ns: int) -> t
     until_ns = now_ns + rules.ahead_ns
     total = (until_ns - loop.capture_ns) * _NS
     if total > 0.0:
-        x, y, c, s = _advance(lx, ly, lc, ls, v1, loop.u1, total)
+        u1 = loop.u1 + _further(loop, rules, total) / total
+        x, y, c, s = _advance(lx, ly, lc, ls, v1, u1, total)
         at_x, at_y, at_c, at_s = _predict_follower(loop, rules, sent, arcs, until_ns)
         if x != at_x or y != at_y:
             lx, ly, lc, ls = x, y, c, s
@@ -1025,14 +1037,14 @@ def _wanted(loop: Record, rules: Record, sent: int, arcs: int, now_ns: int) -> t
 
 @_compiled()
 def _leader_turn(loop: Record, rules: Record, ahead: float) -> float:
-    """The leader's turn rate as told, or as foreseen (``controllers.feedforward``)."""
+    """The leader's turn rate as told, or as foreseen (``estimation.foresight``)."""
     told: float = loop.leader_u1
     if rules.law == IDEAL:
         return told
     u1: float = max(-rules.k_u, min(rules.k_u, loop.u1 + 2.0 * (loop.u1 - loop.slow_u1)))
     if rules.law == FADED:
         doubt = (loop.var_u1 + rules.q_u * ahead) / rules.spread
-        u1 *= max(0.0, 1.0 - doubt * doubt)
+        u1 *= max(0.0, 1.0 - _ERRORS_TOGETHER * doubt * doubt)
     return u1
 
 

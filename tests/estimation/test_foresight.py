@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import solve_continuous_are
 
-from controllers.feedforward import Foresight, TurnTrend
+from estimation.foresight import Foresight, TurnTrend
 
 SIGHT = Foresight(k_u=0.7, diffusion=0.245)
 MS = 1_000_000
@@ -32,14 +32,17 @@ def test_a_filter_lags_behind_a_ramp_by_its_variance_over_the_diffusion(noise: f
     q = SIGHT.diffusion
     covariance = solve_continuous_are(motion.T, seen.T, np.diag([0.0, 0.0, q]), np.array([[noise]]))
     gain = covariance @ seen.T / noise
-    # An error that no longer changes under u1 rising by 1 per second.
-    lag = np.linalg.solve(motion - gain @ seen, [0.0, 0.0, -1.0])[2]
-    assert lag == pytest.approx(covariance[2, 2] / q, rel=1e-5)
+    # Errors of position, velocity across and turn rate that no longer change under u1 rising by 1 per second.
+    _, across, turn = np.linalg.solve(motion - gain @ seen, [0.0, 0.0, -1.0])
+    assert turn == pytest.approx(covariance[2, 2] / q, rel=1e-5)
+    assert across / v1 == pytest.approx(0.5 * turn**2, rel=1e-5)
 
 
 @given(rates, variances, st.floats(0.0, 1.0))
 def test_a_steady_turn_is_foreseen_as_it_is(u1: float, variance: float, ahead: float) -> None:
-    assert SIGHT.predicted(after([u1] * 5, variance, ahead)) == u1
+    trend = after([u1] * 5, variance, ahead)
+    assert SIGHT.predicted(trend) == u1
+    assert SIGHT.further(trend, ahead) == 0.0
 
 
 @pytest.mark.parametrize("behind", [0.05, 0.2])
@@ -48,6 +51,15 @@ def test_a_ramp_is_carried_on_by_what_its_estimate_is_behind(behind: float) -> N
     seen = [0.1 * (0.001 * n - behind) for n in range(3000)]
     foreseen = SIGHT.predicted(after(seen, variance, 0.75 * behind))
     assert foreseen == pytest.approx(0.1 * 2.999, abs=1e-4)
+
+
+@pytest.mark.parametrize("behind", [0.02, 0.1])
+def test_on_a_ramp_the_leader_turns_further_by_the_square_of_that(behind: float) -> None:
+    variance = 0.25 * behind * SIGHT.diffusion
+    seen = [0.1 * (0.001 * n - behind) for n in range(3000)]
+    further = SIGHT.further(after(seen, variance, 0.75 * behind), 0.75 * behind)
+    removed = 1.0 - 25.0 / 36.0 * behind * SIGHT.diffusion / SIGHT.spread
+    assert further == pytest.approx(removed * 0.5 * 0.1 * behind**2, rel=0.05)
 
 
 def test_what_is_left_of_a_swing_is_of_second_order() -> None:
@@ -74,6 +86,11 @@ def test_the_more_doubt_the_less_is_fed_forward(one: float, other: float, ahead:
     assert 1.0 >= SIGHT.weight(less, ahead) >= SIGHT.weight(more, ahead) >= 0.0
     assert SIGHT.weight(0.0, 0.0) == 1.0
     assert SIGHT.weight(SIGHT.spread, ahead) == 0.0
+
+
+@given(rates, rates, st.floats(0.0, 2.0))
+def test_an_estimate_that_says_little_is_not_turned_further(u1: float, slow: float, ahead: float) -> None:
+    assert SIGHT.further(TurnTrend(0, u1, 1.5 * SIGHT.spread, slow), ahead) == 0.0
 
 
 def test_an_estimate_heard_again_changes_nothing() -> None:
