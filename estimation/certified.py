@@ -14,6 +14,7 @@ from enum import Enum
 
 import numpy as np
 
+from estimation.certified_kernels import ACCELERATION, CERTAIN, NOISE, SLOW, intersect
 from formation.angles import FloatArray, wrap
 
 _LONGEST = 1.5
@@ -36,6 +37,9 @@ class Failed(Enum):
     NOISE = "noise"
     SLOW = "slow"
     ACCELERATION = "acceleration"
+
+
+_FAILED = {NOISE: Failed.NOISE, SLOW: Failed.SLOW, ACCELERATION: Failed.ACCELERATION}
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,47 +74,23 @@ class Certain:
 
 
 def certain_motion(
-    back: FloatArray, moved: FloatArray, blur: FloatArray | float, A: float, speeds: tuple[float, float]
+    back: FloatArray, moved: FloatArray, blur: FloatArray, A: float, speeds: tuple[float, float]
 ) -> CertainMotion | Failed:
-    """From the leader's displacement (n, 2) [m] since ``back`` (n,) [s] > 0 ago, for each known within blur.
+    """From the leader's displacement (n, 2) [m] since ``back`` (n,) [s] > 0 ago.
 
-    ``blur``: bound of the displacement's error [m], of shape (n,) or the same for all. ``A``: bound of the
+    ``blur``: bound of each displacement's error (n,) [m]. ``A``: bound of the
     acceleration [m/s^2]. ``speeds``: least and largest speed [m/s] that is known beforehand. The direction is
     in the frame of the displacements. Fails if they contradict what is assumed.
     """
     if len(back) == 0:
         return Failed.GAP
-    x, y = moved[:, 0] / back, moved[:, 1] / back
-    by_blur = blur / back
-    radius = by_blur + 0.5 * A * back
-    length = np.hypot(x, y)
-    if float(np.max(length - by_blur)) > speeds[1]:
-        return Failed.NOISE
-    low = max(speeds[0], float(np.max(length - radius)))
-    farthest = float(np.min(length + radius))
-    if farthest < speeds[0]:
-        return Failed.SLOW
-    high = min(speeds[1], farthest)
-    if low > high:
-        return Failed.ACCELERATION
-    speed = _between(low, high)
-    best = int(np.argmin(radius))
-    if np.any(np.hypot(x - x[best], y - y[best]) > radius + radius[best]):
-        return Failed.ACCELERATION
-    direction = math.atan2(y[best], x[best])
-    # A disc is seen from the origin under arcsin(radius / length); a known least speed helps as much.
-    farther = np.maximum(length, low)
-    half = np.where(radius < farther, np.arcsin(np.minimum(radius / farther, 1.0)), math.pi)
-    offset = np.asarray(wrap(np.arctan2(y, x) - direction))
-    # Beyond half a turn about the best direction, intervals on the circle could meet twice.
-    useful = np.abs(offset) + half < math.pi
-    if not np.any(useful):
-        return CertainMotion(speed, Interval(direction, math.pi))
-    left, right = float(np.max((offset - half)[useful])), float(np.min((offset + half)[useful]))
-    if left > right:
-        return Failed.ACCELERATION
-    turned = _between(left, right)
-    return CertainMotion(speed, Interval(wrap(direction + turned.centre), turned.half))
+    ranges = np.empty(4)
+    outcome = intersect(back, moved, blur, A, *speeds, ranges)
+    if outcome != CERTAIN:
+        return _FAILED[outcome]
+    low, high, direction, half = ranges.tolist()
+    speed = Interval(0.5 * (low + high), 0.5 * (high - low))
+    return CertainMotion(speed, Interval(wrap(direction), half))
 
 
 def certain_alpha1(direction: Interval, line: Interval) -> Interval:
@@ -121,7 +101,3 @@ def certain_alpha1(direction: Interval, line: Interval) -> Interval:
 def window_ns(best: float, step: float) -> int:
     """How far back to look [ns], from the window [s] that is best and the time [s] between measurements."""
     return round(1e9 * max(_LONGEST * best, _FEWEST_STEPS * step))
-
-
-def _between(low: float, high: float) -> Interval:
-    return Interval(0.5 * (low + high), 0.5 * (high - low))

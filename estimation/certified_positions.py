@@ -45,7 +45,7 @@ class PositionCertifier:
         back: FloatArray = np.multiply(capture_ns - known.capture_ns[:-1], _NS)
         places = known.values[:, :2]
         moved = places[-1] - places[:-1]
-        motion = certain_motion(back, moved, 2.0 * self.eps, self.A, self.speeds)
+        motion = certain_motion(back, moved, np.full(len(back), 2.0 * self.eps), self.A, self.speeds)
         if isinstance(motion, Failed):
             return motion
         return Certain(

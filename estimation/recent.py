@@ -40,6 +40,8 @@ def with_recent(recent: Recent, capture_ns: int, values: Sequence[float], span_n
             return recent
         return Recent(np.insert(times, place, capture_ns), np.insert(recent.values, place, values, axis=0))
     first = int(np.searchsorted(times, capture_ns - span_ns))
-    return Recent(
-        np.concatenate((times[first:], (capture_ns,))), np.concatenate((recent.values[first:], (values,)))
-    )
+    kept = place - first
+    longer, more = np.empty(kept + 1, dtype=np.int64), np.empty((kept + 1, len(values)))
+    longer[:kept], longer[kept] = times[first:], capture_ns
+    more[:kept], more[kept] = recent.values[first:], values
+    return Recent(longer, more)

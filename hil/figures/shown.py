@@ -13,6 +13,7 @@ from estimation.bound_check import ROUNDING
 from estimation.tracking import Status
 from formation.angles import FloatArray
 from hil.judge.bounds import WorstErrors, bound_errors, named_bounds, worst_errors
+from hil.judge.certified import CertifiedColumns
 from hil.judge.columns import Columns, EstimateColumns, columns_of
 from hil.judge.evidence import Evidence
 from hil.judge.noise_free_orbit import NoiseFreeOrbit, noise_free_orbit
@@ -29,7 +30,7 @@ class Shown:
 
     ``worst``: what the bounds rest on, None without judged samples; ``bounds``, ``errors``: the named bounds
     at the judged samples, and the sizes of the errors of v1, alpha1 and h there; ``orbit``: the
-    noise-free run, where it is known.
+    noise-free run, where it is known; ``certified``: estimates with guaranteed radii, where there are any.
     """
 
     evidence: Evidence
@@ -40,6 +41,7 @@ class Shown:
     bounds: Mapping[str, FloatArray]
     errors: Mapping[str, FloatArray]
     orbit: NoiseFreeOrbit | None
+    certified: CertifiedColumns
 
     @staticmethod
     def of(evidence: Evidence) -> Shown:
@@ -58,7 +60,8 @@ class Shown:
             bounds = named_bounds(evidence.scenario, columns, worst)
             errors = bound_errors(evidence.scenario, columns)
         true = columns.truth.at(tracked.capture_ns)
-        return Shown(evidence, columns, tracked, true, worst, bounds, errors, orbit)
+        certified = CertifiedColumns.of(evidence.certified, columns.span)
+        return Shown(evidence, columns, tracked, true, worst, bounds, errors, orbit, certified)
 
     def seconds(self, moments_ns: Stamps) -> FloatArray:
         """Moments as seconds of the run."""

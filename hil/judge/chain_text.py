@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from hil.judge.certified import certified_violations
 from hil.judge.summary_text import BAD, GOOD, PLAIN, extended_violations, parity_line, warnings_of
 
 _COLUMNS = ("follower", "rho [m]", "settled", "v1 RMSE", "alpha1", "bounds", "p50, p99")
@@ -60,7 +61,7 @@ def _cells(pair: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     rmse = pair["estimation"].get("rmse", {})
     yield (f"{1e3 * rmse['v1']:.1f} mm/s" if "v1" in rmse else ""), PLAIN
     yield (f"{math.degrees(rmse['alpha1']):.2f} deg" if "alpha1" in rmse else ""), PLAIN
-    broken = sum(extended_violations(pair).values())
+    broken = sum((extended_violations(pair) | certified_violations(pair)).values())
     known = "violations" in pair["bounds"]
     yield (f"{broken} broken" if broken else "kept" if known else ""), BAD if broken else GOOD
     latency = pair.get("latency_ms", {}).get("capture_to_command")

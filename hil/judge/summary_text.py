@@ -43,6 +43,7 @@ def warnings_of(summary: Mapping[str, Any]) -> list[str]:
     return [
         *_estimation_warnings(summary),
         *_assumption_warnings(summary),
+        *_certified_warnings(summary),
         *_formation_warnings(summary),
         *_wire_warnings(summary),
     ]
@@ -57,6 +58,7 @@ def verdict_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     title = f"{summary['scenario']}, {summary['mode']}, {summary['duration_s']:.1f} s ({made_by}{seed})"
     yield "run", title, PLAIN
     yield from _estimate_lines(summary)
+    yield from _certified_line(summary)
     formation = summary.get("formation", {})
     if "rho_min" in formation:
         text = f"rho {formation['rho_min']:.3f} to {formation['rho_max']:.3f} m"
@@ -98,6 +100,30 @@ def _estimate_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]
         count = f"{sum(broken.values())} times" if broken else "nowhere"
         verdict = f"extended ones violated {count} in {bounds['checked']} samples{tight}"
         yield "bounds", verdict, BAD if broken else GOOD
+
+
+def _certified_line(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    certified = summary.get("certified", {})
+    v1, alpha1 = certified.get("v1", {}), certified.get("alpha1", {})
+    if "median" not in v1:
+        return
+    radii = f"v1 within {1e3 * v1['median']:.0f} mm/s, alpha1 within {math.degrees(alpha1['median']):.1f} deg"
+    if "violations" not in v1:
+        yield "certified", f"{radii} (medians of {certified['certified']} samples)", PLAIN
+        return
+    broken = v1["violations"] + alpha1["violations"]
+    count = f"{broken} times" if broken else "nowhere"
+    tight = f"errors up to {max(v1['tightness'], alpha1['tightness']):.0%}"
+    verdict = f"{radii} (medians), violated {count} in {certified['certified']} samples ({tight})"
+    yield "certified", verdict, BAD if broken else GOOD
+
+
+def _certified_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
+    certified = summary.get("certified", {})
+    if failed := certified.get("failed", {}):
+        causes = ", ".join(f"{cause} {count}" for cause, count in sorted(failed.items()))
+        total = certified["certified"] + sum(failed.values())
+        yield f"{sum(failed.values())} of {total} estimates could not be certified: {causes}"
 
 
 def _wire_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:

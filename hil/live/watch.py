@@ -34,6 +34,7 @@ class Picture:
     problems: dict[str, str] = field(default_factory=dict)
     motion_since_ns: int | None = None
     estimates: dict[str, msg.LeaderEstimate] = field(default_factory=dict)
+    certified: dict[str, msg.CertifiedEstimate] = field(default_factory=dict)
     commands: dict[str, msg.Command] = field(default_factory=dict)
     truths: dict[str, msg.Truth] = field(default_factory=dict)
 
@@ -61,6 +62,8 @@ class Picture:
         for seen in self.estimates.values():
             yield f"{Status(seen.status).name.lower():12s}"
             yield f"rho {seen.rho:.3f} m  v1 {seen.v1 * 1e3:4.0f} mm/s  alpha1 {seen.alpha1:+.2f} rad"
+        for sure in self.certified.values():
+            yield sure.failed or f"certain to {sure.radius_v1 * 1e3:3.0f} mm/s, {sure.radius_alpha1:.2f} rad"
         for sent in self.commands.values():
             yield sent.stop or f"v2 {sent.v2:+.3f} m/s  u2 {sent.u2:+.2f} rad/s"
 
@@ -85,7 +88,7 @@ class Watch:
             *(
                 session.declare_subscriber(topic, self._keep)
                 for pair in pairs
-                for topic in (pair.estimate, pair.command, pair.truth)
+                for topic in (pair.estimate, pair.certified, pair.command, pair.truth)
             ),
         ]
         self._pairs = pairs
@@ -100,6 +103,10 @@ class Watch:
             with contextlib.suppress(MalformedPayloadError, ValueError):
                 if pair.estimate in latest:
                     picture.estimates[pair.follower] = decode_as(latest[pair.estimate], msg.LeaderEstimate)
+                if pair.certified in latest:
+                    picture.certified[pair.follower] = decode_as(
+                        latest[pair.certified], msg.CertifiedEstimate
+                    )
                 if pair.command in latest:
                     picture.commands[pair.follower] = decode_as(latest[pair.command], msg.Command)
                 if pair.truth in latest:

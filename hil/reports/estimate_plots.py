@@ -13,6 +13,7 @@ from formation.angles import FloatArray
 from hil.figures.shown import Shown, broken_at_jumps, outside
 from hil.judge.columns import EstimateColumns, inside
 from hil.judge.estimation import errors_at
+from hil.reports.certified_lines import draw_certified, largest_radius
 from hil.reports.plots import (
     BELIEVED,
     BOUND,
@@ -99,6 +100,8 @@ def _course(
             draw_line(plot, sides, side, BOUND, width=1.0)
         keys.append(Key("assumed bound", BOUND))
         says += f"; its error is bounded by {_range(bound, quantity.unit)} if the scenario's noise holds"
+    if judged and largest_radius(shown, quantity.name) is not None:
+        keys.append(draw_certified(plot, shown, quantity.name, of_error=False))
     return Panel(quantity.says, says + ".", tuple(keys), plot)
 
 
@@ -118,6 +121,12 @@ def _error(
     drawn = bound is not None and float(np.min(bound)) < _FARTHEST * height
     if bound is not None and drawn:
         height = max(height, min(1.1 * float(np.max(bound)), _FARTHEST * height))
+    radius = largest_radius(shown, quantity.name)
+    certified = radius is not None and radius < _FARTHEST * height
+    if radius is not None:
+        height = max(height, 1.1 * radius) if certified else height
+        where = "" if certified else ", outside the picture"
+        says += f" Certified radius: up to {radius:.3g} {quantity.unit}{where}."
     plot = axis.panel(f"error [{quantity.unit}]", (-height, height))
     source = table(t, error, {"y": error, "low": -reach, "high": reach})
     draw_band(plot, source, "low", "high", BELIEVED)
@@ -128,6 +137,8 @@ def _error(
         "3 σ": f"±@high{{0.00000}} {quantity.unit}",
     }
     hover(plot, draw_line(plot, source, "y", BELIEVED, width=1.1), tips)
+    if certified:
+        keys.append(draw_certified(plot, shown, quantity.name, of_error=True))
     if bound is not None:
         label = f"largest judged error {_RATES[quantity.name]}" if quantity.name in _RATES else "bound"
         says += f" {label[0].upper()}{label[1:]}: {_range(bound, quantity.unit)}"

@@ -36,6 +36,15 @@ _SCALARS = (
     ("formation.equilibrium_deviation_rms.alpha1", "α₁ off its station, RMS", "deg", degrees(1.0)),
     ("formation.orbit_deviation_rms.rho", "ρ off the noise-free run, RMS", "mm", 1e3),
     ("formation.orbit_deviation_rms.alpha1", "α₁ off the noise-free run, RMS", "deg", degrees(1.0)),
+    ("certified.certified", "certified", "", 1.0),
+    ("certified.v1.median", "radius of v₁, median", "mm/s", 1e3),
+    ("certified.v1.largest", "radius of v₁, largest", "mm/s", 1e3),
+    ("certified.v1.tightness", "largest error / radius of v₁", "", 1.0),
+    ("certified.v1.violations", "v₁ outside its radius", "", 1.0),
+    ("certified.alpha1.median", "radius of α₁, median", "deg", degrees(1.0)),
+    ("certified.alpha1.largest", "radius of α₁, largest", "deg", degrees(1.0)),
+    ("certified.alpha1.tightness", "largest error / radius of α₁", "", 1.0),
+    ("certified.alpha1.violations", "α₁ outside its radius", "", 1.0),
     ("latency_ms.capture_to_command.p50", "capture to command, median", "ms", 1.0),
     ("latency_ms.capture_to_command.p99", "capture to command, 99 %", "ms", 1.0),
     ("latency_ms.capture_to_command.max", "capture to command, largest", "ms", 1.0),
@@ -44,6 +53,7 @@ _COUNTS = {
     "estimation": "Estimates",
     "bounds": "Bounds",
     "formation": "Formation",
+    "certified": "Certified estimates",
     "latency_ms": "Latency",
 }
 _MOST_STOPS = 20

@@ -18,7 +18,9 @@ def moved(*rows: tuple[float, float]) -> FloatArray:
 def test_the_worst_noise_and_turn_come_to_the_edge() -> None:
     """Straight positions that a difference over the best window misjudges as much as it ever can."""
     window = 2.0 * math.sqrt(EPS / A)
-    found = certain_motion(np.array([window]), moved((0.08 * window, 0.0)), 2.0 * EPS, A, (0.0, 1.0))
+    found = certain_motion(
+        np.array([window]), moved((0.08 * window, 0.0)), np.array([2.0 * EPS]), A, (0.0, 1.0)
+    )
     assert not isinstance(found, Failed)
     assert found.speed.half == pytest.approx(2.0 * math.sqrt(EPS * A))
     assert found.direction.half == pytest.approx(math.asin(found.speed.half / 0.08))
@@ -35,7 +37,7 @@ def test_the_worst_noise_and_turn_come_to_the_edge() -> None:
     ],
 )
 def test_it_is_told_which_premise_fails(back: list[float], rows: FloatArray, expected: Failed) -> None:
-    assert certain_motion(np.array(back), rows, 2.0 * EPS, A, SPEEDS) is expected
+    assert certain_motion(np.array(back), rows, np.full(len(back), 2.0 * EPS), A, SPEEDS) is expected
 
 
 def test_radius_is_the_distance_to_the_farthest_possible_value() -> None:

@@ -34,9 +34,24 @@ def test_a_good_run_is_told_without_warnings(summary: dict[str, Any]) -> None:
     assert "!" not in text
 
 
+CERTIFIED: dict[str, Any] = {
+    "certified": 170,
+    "v1": {"median": 0.0194, "largest": 0.02, "violations": 0, "tightness": 0.2},
+    "alpha1": {"median": 0.29, "largest": 0.4, "violations": 0, "tightness": 0.25},
+}
+
+
+def test_certified_radii_are_told(summary: dict[str, Any]) -> None:
+    said = " ".join(printed(summary | {"certified": CERTIFIED}).split())
+    assert "v1 within 19 mm/s, alpha1 within 16.6 deg (medians), violated nowhere in 170 samples" in said
+    broken = CERTIFIED | {"v1": {"median": 0.0194, "violations": 3, "tightness": 1.2}}
+    assert "violated 3 times in 170 samples" in " ".join(printed(summary | {"certified": broken}).split())
+
+
 @pytest.mark.parametrize(
     ("part", "change", "said"),
     [
+        ("certified", CERTIFIED | {"failed": {"gap": 4, "noise": 6}}, "10 of 180 estimates could not be"),
         ("estimation", {"samples": 0}, "nothing to judge"),
         ("estimation", {"untracked": 20}, "20 of 200 estimates"),
         ("estimation", {"coverage_3sigma": {"v1": 0.9}}, "too sure of v1: only 90.0%"),

@@ -20,6 +20,7 @@ from hil.judge.evidence import Evidence, evidence_of_log
 from hil.judge.summary import summarise
 from hil.log.reader import Log
 from hil.reports.run_report import run_report
+from hil.wire.message_types import CertifiedEstimate
 from tests.hil.reports.open_page import open_page
 
 NAN = math.nan
@@ -115,6 +116,16 @@ def renumbered(page: str) -> str:
 
 
 EVIL = "</title></script><script>alert(1)</script>"
+
+
+def test_certified_radii_are_drawn_with_the_estimates(exact_evidence: Evidence) -> None:
+    certified = [
+        CertifiedEstimate(each.header, each.computed, each.v1, 0.02, each.alpha1, 0.3, 50, "")
+        for each in exact_evidence.estimates
+    ]
+    said = words(report(replace(exact_evidence, certified=certified)))
+    assert "Certified radius: up to 0.02 m/s" in said
+    assert "radius of v₁, median 20 mm/s" in said
 
 
 @pytest.fixture(scope="module")
