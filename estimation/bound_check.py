@@ -12,14 +12,10 @@ from estimation.bounds import (
     Perceived,
     RateErrors,
     Values,
-    extended_alpha1,
-    extended_h,
-    extended_v1,
+    extended_bounds,
     paper_alpha1,
     paper_h,
-    sound_alpha1,
-    sound_h,
-    sound_v1,
+    sound_bounds,
 )
 from formation.angles import FloatArray, wrap
 from formation.spacing import Spacing
@@ -67,13 +63,15 @@ def all_bounds(
     spacing: Spacing,
 ) -> dict[str, FloatArray]:
     """Every named bound for the same moment(s): the keys of ``bounds`` in the JSON of a run."""
+    sound = sound_bounds(perceived, rates, v_eps, mu1, spacing)
+    extended = extended_bounds(perceived, rates, inputs, v_eps, mu1, spacing)
     return {
-        "v1": sound_v1(perceived, rates),
-        "alpha1": sound_alpha1(perceived, rates, v_eps),
-        "h": sound_h(perceived, rates, v_eps, mu1, spacing),
-        "v1_extended": extended_v1(perceived, rates, inputs),
-        "alpha1_extended": extended_alpha1(perceived, rates, inputs, v_eps),
-        "h_extended": extended_h(perceived, rates, inputs, v_eps, mu1, spacing),
+        "v1": sound.v1,
+        "alpha1": sound.alpha1,
+        "h": sound.h,
+        "v1_extended": extended.v1,
+        "alpha1_extended": extended.alpha1,
+        "h_extended": extended.h,
         "paper_alpha1": paper_alpha1(perceived, rates, v_eps),
         "paper_h": paper_h(perceived, rates, mu1, spacing),
     }

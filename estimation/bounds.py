@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -78,6 +79,14 @@ class Perceived:
         x = -rho_dot - v2 * np.cos(alpha2)
         y = rho * (alpha2_dot + u2) - v2 * np.sin(alpha2)
         return Perceived(rho, alpha2, rho_dot, alpha2_dot, np.hypot(x, y), np.arctan2(y, x), v2, u2)
+
+
+class Bounds(NamedTuple):
+    """Bounds of the errors of v1 [m/s], alpha1 [rad] and h [rad/s], in one of the forms."""
+
+    v1: FloatArray
+    alpha1: FloatArray
+    h: FloatArray
 
 
 def sound_v1(perceived: Perceived, rates: RateErrors) -> FloatArray:
@@ -152,10 +161,18 @@ def sound_h(
     Law (8) put into the alpha1 dynamics of (5) leaves h_hat - h = (Y - Y_hat)/rho
     - mu1 (cos(alpha1_hat) - cos(alpha1)) + (v1_hat - v1) f(rho), whose first term is the error of alpha2_dot.
     """
-    change = cosine_change(perceived.alpha1, sound_alpha1(perceived, rates, v_eps))
+    return sound_bounds(perceived, rates, v_eps, mu1, spacing).h
+
+
+def sound_bounds(
+    perceived: Perceived, rates: RateErrors, v_eps: Values, mu1: float, spacing: Spacing
+) -> Bounds:
+    """:func:`sound_v1`, :func:`sound_alpha1` and :func:`sound_h` at once: each builds on the one before."""
+    v1 = sound_v1(perceived, rates)
+    alpha1 = _subtended(v1, perceived.v1, v_eps)
     f = np.abs(spacing.f(np.asarray(perceived.rho)))
-    bound: FloatArray = rates.M_alpha2 + mu1 * change + f * sound_v1(perceived, rates)
-    return bound
+    change = cosine_change(perceived.alpha1, alpha1)
+    return Bounds(v1, alpha1, rates.M_alpha2 + mu1 * change + f * v1)
 
 
 def extended_h(
@@ -178,6 +195,20 @@ def extended_h(
     * v1_hat f(rho_hat) rho_hat/rho - v1 f(rho) = (v1_hat - v1) f(rho) + v1_hat (f(rho_hat) - f(rho))
       + v1_hat f(rho_hat) (rho_hat/rho - 1), where f is largest and changes most at lo or hi because it grows.
     """
+    return extended_bounds(perceived, rates, inputs, v_eps, mu1, spacing).h
+
+
+def extended_bounds(
+    perceived: Perceived,
+    rates: RateErrors,
+    inputs: InputErrors,
+    v_eps: Values,
+    mu1: float,
+    spacing: Spacing,
+) -> Bounds:
+    """:func:`extended_v1`, :func:`extended_alpha1` and :func:`extended_h` at once."""
+    v1 = extended_v1(perceived, rates, inputs)
+    alpha1 = _subtended(v1, perceived.v1, v_eps)
     rho = np.asarray(perceived.rho)
     known = rho > inputs.E_rho
     lo = np.where(known, rho - inputs.E_rho, rho)
@@ -186,13 +217,12 @@ def extended_h(
 
     turn = np.abs(np.asarray(perceived.alpha2_dot) + perceived.u2)
     line = rates.M_alpha2 + inputs.E_u2 + stretch * turn + _sideways_error(perceived, inputs) / lo
-    change = cosine_change(perceived.alpha1, extended_alpha1(perceived, rates, inputs, v_eps))
+    change = cosine_change(perceived.alpha1, alpha1)
     bearing = mu1 * (change + stretch * np.abs(np.cos(perceived.alpha1)))
     largest_f = np.maximum(np.abs(f_lo), np.abs(f_hi))
     f_change = np.maximum(f_hat - f_lo, f_hi - f_hat)
-    distance = extended_v1(perceived, rates, inputs) * largest_f
-    distance = distance + perceived.v1 * (f_change + stretch * np.abs(f_hat))
-    return np.where(known, line + bearing + distance, math.inf)
+    distance = v1 * largest_f + perceived.v1 * (f_change + stretch * np.abs(f_hat))
+    return Bounds(v1, alpha1, np.where(known, line + bearing + distance, math.inf))
 
 
 def cosine_change(angle: Values, span: Values) -> FloatArray:
