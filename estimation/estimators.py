@@ -6,6 +6,7 @@ An estimator's module is loaded when one is built, since the compiler and filter
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 from estimation.belief import Model
 from estimation.estimator import Estimator
@@ -80,10 +81,26 @@ def make_estimator(name: str, model: Model, cutoff: float = 0.1) -> Estimator:
     return ESTIMATORS[name](model, cutoff)
 
 
-def settling(name: str) -> tuple[float, float]:
-    """Standard deviations of the leader's direction [rad] below which a track settles and above which not.
+class Settling(NamedTuple):
+    """What a tracker's settings of these names are to be: three angles [rad] and a choice."""
+
+    settled_heading: float
+    unsettled_heading: float
+    followed_turn: float
+    capped_speed: bool
+
+
+def settling(name: str) -> Settling:
+    """How well an estimator of this name must know the leader's direction to be trusted with it.
+
+    Up to about 0.4 rad the filters' standard deviations are honest; above, errors of more than a right angle
+    are some ten times as frequent, since the model is linearised along the direction. A coarse sensor (25 mm
+    at 10 Hz) hardly ever knows a leader at half of its speed limit to 0.25 rad.
 
     Differences of a mocap heading of 0.2 deg know the direction to half a radian at 0.8 m. Who asks for them
-    accepts this, and with it that they may take noise for motion while the leader still stands.
+    accepts this, and with it that they may take noise for motion while the leader still stands. So would
+    ``shape-ekf`` at 0.35 rad: it cannot hold a speed of zero.
     """
-    return (0.6, 1.2) if name == "difference" else (0.25, 0.6)
+    if name == "difference":
+        return Settling(0.6, 1.2, 0.6, capped_speed=False)
+    return Settling(0.25 if name == "shape-ekf" else 0.35, 0.6, 0.25, capped_speed=True)

@@ -66,6 +66,8 @@ class TrackSettings:
     coast_after, lost_after, window: [s]. doubt_for: how long [s] a jump stays in doubt.
     settled_heading, unsettled_heading: standard deviation of the leader's direction [rad] below which a track
     settles, and above which it no longer counts as settled.
+    capped_speed: whether a leader that seems faster than k_v settles as one of k_v would.
+    followed_turn: how far [rad] a jump may turn alpha1 and alpha2 for the track to follow it.
     """
 
     gate_probability: float = 0.9999
@@ -74,8 +76,10 @@ class TrackSettings:
     lost_after: float = 1.0
     window: float = 0.2
     doubt_for: float = 2.0
-    settled_heading: float = 0.25
+    settled_heading: float = 0.35
     unsettled_heading: float = 0.6
+    capped_speed: bool = True
+    followed_turn: float = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,14 +245,14 @@ class Tracker:
         """Point of a candidate that takes over, in doubt by its jump; None if it is not ripe or goes too far.
 
         Too far is what would turn the line between the robots, and with it alpha1 and alpha2, by more than
-        the angle that a track may be uncertain by to settle.
+        ``followed_turn``.
         """
         candidate, measurement = rejected.candidate, rejected.measurement
         if candidate is None or candidate.frames < self.settings.reacquire_frames:
             return None
         prior, leader_fits = rejected.belief, rejected.nis <= self._gate
         doubt = jump(rejected.doubt, measurement, prior, rejected.watch, leader_fits=leader_fits)
-        if turned(doubt, measurement) > self.settings.settled_heading:
+        if turned(doubt, measurement) > self.settings.followed_turn:
             return None
         belief = self.estimator.update(prior, measurement) if leader_fits else candidate.belief
         return TrackPoint(
@@ -267,11 +271,18 @@ class Tracker:
         return doubt if (now_ns - doubt.since_ns) * _NS <= self.settings.doubt_for else NO_DOUBT
 
     def settled(self, belief: Belief, before: bool) -> bool:
-        """Whether the leader's direction is known well enough, for a track that was settled before or not."""
-        settings, limits = self.settings, self.estimator.model.limits
-        if belief.speed < 0.5 * limits.v_eps:
+        """Whether the leader's direction is known well enough, for a track that was settled before or not.
+
+        The first few measurements may make a leader seem faster than any is, and its direction the better
+        known by as much. What is above k_v therefore doesn't help to settle, unless the settings let it.
+        """
+        settings, limits, speed = self.settings, self.estimator.model.limits, belief.speed
+        if speed < 0.5 * limits.v_eps:
             return False
-        return belief.sd_heading < (settings.unsettled_heading if before else settings.settled_heading)
+        if before:
+            return belief.sd_heading < settings.unsettled_heading
+        excess = max(1.0, speed / limits.k_v) if settings.capped_speed else 1.0
+        return belief.sd_heading * excess < settings.settled_heading
 
     def _window_begin_ns(self, track: Track) -> int:
         return track[-1].measurement.capture_ns - round(self.settings.window / _NS)

@@ -19,15 +19,13 @@ from hil.scenario.schema import Scenario
 def leader_tracker(scenario: Scenario) -> Tracker:
     """Tracker of a scenario. Raises :class:`UsageError` like :func:`leader_filter`."""
     given = scenario.estimator
-    settled, unsettled = settling(given.kind)
     settings = TrackSettings(
         gate_probability=given.gate_probability,
         reacquire_frames=given.reacquire_frames,
         coast_after=given.coast_after_s,
         lost_after=given.lost_after_s,
         window=given.window_s,
-        settled_heading=settled,
-        unsettled_heading=unsettled,
+        **settling(given.kind)._asdict(),
     )
     return Tracker(leader_filter(scenario), settings)
 

@@ -271,7 +271,6 @@ def _eye(scenario: Scenario) -> dict[str, float]:
     given, leader = scenario.estimator, scenario.leader
     limits = LeaderLimits(leader.v_eps, leader.k_v, leader.k_u)
     noise = ProcessNoise.by_rule(limits, given.turn_bandwidth, given.speed_bandwidth)
-    settled, unsettled = settling(given.kind)
     return {
         "kind": KINDS[given.kind],
         "reacquire_frames": given.reacquire_frames,
@@ -288,8 +287,7 @@ def _eye(scenario: Scenario) -> dict[str, float]:
         "gate": -2.0 * math.log1p(-given.gate_probability),
         "coast_after": given.coast_after_s,
         "lost_after": given.lost_after_s,
-        "settled_heading": settled,
-        "unsettled_heading": unsettled,
+        **settling(given.kind)._asdict(),
         "doubt_for": TrackSettings().doubt_for,
         "cutoff": given.difference_cutoff_s,
     }

@@ -69,7 +69,7 @@ RULES = _fields(
     "lag v_max u_max v_resolution u_resolution sigma_position sigma_heading static_fraction "
     "odometry_sigma_v odometry_sigma_u loss p0 p1 p2 p3 "
     "q_v q_u q_start v_eps k_v k_u sd_position sd_heading sd_v2 sd_u2 gate coast_after lost_after "
-    "settled_heading unsettled_heading doubt_for cutoff "
+    "settled_heading unsettled_heading capped_speed followed_turn doubt_for cutoff "
     "max_age assumed_lag mu1 mu2 mu_rho rho_0 v_limit u_limit v_step u_step spread",
 )
 """All that is fixed in a run. p0 to p3: the fields of the leader's program in :mod:`formation.leader`."""
@@ -658,8 +658,10 @@ def _settled(b: Record, rules: Record, before: int) -> bool:
         return False
     half = 0.5 * (b.vx_vx - b.vy_vy)
     largest = max(0.0, 0.5 * (b.vx_vx + b.vy_vy) + math.sqrt(half * half + b.vx_vy * b.vx_vy))
-    limit = rules.unsettled_heading if before else rules.settled_heading
-    return bool(largest < limit * limit * squared)
+    if before:
+        return bool(largest < rules.unsettled_heading * rules.unsettled_heading * squared)
+    helpful = min(squared, rules.k_v * rules.k_v) if rules.capped_speed else squared
+    return bool(largest < rules.settled_heading * rules.settled_heading * helpful)
 
 
 @_compiled()
@@ -849,7 +851,7 @@ def _take_over(run: Record, frame: Record) -> None:
     position += math.hypot(frame.fx - watch.x, frame.fy - watch.y)
     heading += abs(_wrap(frame.heading - watch.heading))
     rho = math.hypot(frame.lx - frame.fx, frame.ly - frame.fy)
-    if heading + (position / rho if rho > 0.0 else math.inf) > rules.settled_heading:
+    if heading + (position / rho if rho > 0.0 else math.inf) > rules.followed_turn:
         return
     if fits:
         _update(prior, track, rules, frame)
