@@ -11,14 +11,16 @@ from pathlib import Path
 from typing import BinaryIO
 
 from mcap.exceptions import McapError
-from mcap.reader import McapReader, NonSeekingReader, SeekingReader
+from mcap.reader import NonSeekingReader, SeekingReader
 from mcap.records import Channel, Schema
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
+from mcap.summary import Summary
 from zstandard import ZstdError
 
 from hil.errors import UsageError
 from hil.log.mcap_chunks import MAGIC
+from hil.log.mcap_order import entries_in_order
 from hil.wire.message_types import Message
 from hil.wire.messages import decode, typestore_of
 
@@ -34,6 +36,7 @@ DAMAGE = (
 )
 """What the ``mcap`` package and the decompressors raise on bytes that are not as they were written."""
 
+_END_OF_TIME = 2**64
 _SHORTEST_BYTES = 2 * len(MAGIC) + 17 + 29
 """Size of an MCAP with nothing but a header (without texts) and a footer."""
 
@@ -87,12 +90,12 @@ class Log:
         if start_ns is not None and end_ns is not None and end_ns <= start_ns:
             return
         with _reading(self.path) as stream:
-            reader: McapReader = (
-                SeekingReader(stream, validate_crcs=True)
-                if self.indexed
-                else NonSeekingReader(stream, validate_crcs=True)
-            )
-            for schema, channel, message in reader.iter_messages(
+            summary = SeekingReader(stream, validate_crcs=True).get_summary() if self.indexed else None
+            if summary is not None and summary.chunk_indexes:
+                yield from _indexed(stream, summary, topics, start_ns, end_ns)
+                return
+            stream.seek(0)
+            for schema, channel, message in NonSeekingReader(stream, validate_crcs=True).iter_messages(
                 topics=topics, starting_at=start_ns, ending_before=end_ns
             ):
                 yield Record(
@@ -111,6 +114,39 @@ class Log:
         """
         text = self.definitions.get(record.typename)
         return decode(record.payload, record.typename, typestore_of(record.typename, text) if text else None)
+
+
+def _indexed(
+    stream: BinaryIO,
+    summary: Summary,
+    topics: Collection[str] | None,
+    start_ns: int | None,
+    end_ns: int | None,
+) -> Iterator[Record]:
+    first, last = 0 if start_ns is None else start_ns, _END_OF_TIME if end_ns is None else end_ns
+    channels = {
+        number: (channel.topic, _typename(summary.schemas[channel.schema_id] if channel.schema_id else None))
+        for number, channel in summary.channels.items()
+        if topics is None or channel.topic in topics
+    }
+    others = summary.channels.keys() - channels.keys()
+
+    def wanted(channel_id: int, log_ns: int) -> bool:
+        if channel_id not in channels and channel_id not in others:
+            raise ValueError(f"a message is of channel {channel_id}, which nothing tells of")
+        return channel_id in channels and first <= log_ns < last
+
+    chunks = [
+        chunk
+        for chunk in summary.chunk_indexes
+        if chunk.message_end_time >= first
+        and chunk.message_start_time < last
+        # Without an index of its own a chunk may hold anything.
+        and not (chunk.message_index_offsets and channels.keys().isdisjoint(chunk.message_index_offsets))
+    ]
+    for entry in entries_in_order(stream, chunks, wanted):
+        topic, typename = channels[entry.channel_id]
+        yield Record(topic, typename, entry.payload, entry.log_ns, entry.publish_ns, entry.sequence)
 
 
 def read_log(path: Path) -> Log:

@@ -16,7 +16,7 @@ from hil.scenario.files import load_scenario
 
 def abreast(*arguments: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "hil", *arguments], capture_output=True, text=True, cwd=folder, timeout=120
+        [sys.executable, "-m", "hil", *arguments], capture_output=True, text=True, cwd=folder, timeout=300
     )
 
 

@@ -126,7 +126,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]
     worker = [*module, "distributed.cli.dask_worker", "--no-nanny", "--nthreads", "1", *options]
     workers = [subprocess.Popen(worker, **quiet) for _ in range(2)]
     try:
-        give_up = time.monotonic() + 30.0
+        give_up = time.monotonic() + 150.0
         while not file.exists() and time.monotonic() < give_up:
             time.sleep(0.05)
         yield json.loads(file.read_text())["address"], workers

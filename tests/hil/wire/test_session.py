@@ -21,14 +21,14 @@ def test_what_one_client_publishes_another_receives_in_order() -> None:
     try:
         receiver.subscribe(("a", "b/c"))
         sent = [Event("b/c", bytes([number])) for number in range(100)]
-        deadline = time.monotonic() + 5.0
+        deadline = time.monotonic() + 60.0
         while receiver.inbox.take(0.05) is None and time.monotonic() < deadline:
             sender.publish("a", b"are you there")
         while receiver.inbox.take(0.2) is not None:
             pass
         for event in sent:
             sender.publish(event.topic, event.payload)
-        assert [receiver.inbox.take(2.0) for _ in sent] == sent
+        assert [receiver.inbox.take(20.0) for _ in sent] == sent
         assert receiver.inbox.take(0.0) is None
     finally:
         for wire in (sender, receiver):

@@ -1,0 +1,72 @@
+"""The messages of an MCAP with an index, in the order of log time, read a chunk at a time.
+
+The ``mcap`` package's own way compares each message with a dozen others, in Python: half of the time that it
+takes to read a log. Here a chunk is sorted at once, and handed on as far as no later chunk can come before.
+Reference: the MCAP format specification, version 0.
+"""
+
+from __future__ import annotations
+
+import struct
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Sequence
+from typing import BinaryIO, NamedTuple
+
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Chunk, ChunkIndex
+from mcap.stream_reader import get_chunk_data_stream
+
+_RECORD = struct.Struct("<BQ")
+_MESSAGE = struct.Struct("<HIQQ")
+
+
+class Entry(NamedTuple):
+    """A message; entries compare by log time, then by their place in the file."""
+
+    log_ns: int
+    chunk_offset: int
+    place: int
+    channel_id: int
+    sequence: int
+    publish_ns: int
+    payload: bytes
+
+
+def entries_in_order(
+    stream: BinaryIO, chunks: Sequence[ChunkIndex], wanted: Callable[[int, int], bool]
+) -> Iterator[Entry]:
+    """Yield the messages whose channel id and log time are wanted.
+
+    Raises what the ``mcap`` package does on bytes that are not as they were written, or ValueError.
+    """
+    ordered = sorted(chunks, key=lambda chunk: (chunk.message_start_time, chunk.chunk_start_offset))
+    waiting: list[Entry] = []
+    for number, chunk in enumerate(ordered, start=1):
+        waiting.extend(_entries(stream, chunk.chunk_start_offset, wanted))
+        waiting.sort()
+        if number < len(ordered):
+            ready = bisect_left(waiting, (ordered[number].message_start_time,))
+        else:
+            ready = len(waiting)
+        yield from waiting[:ready]
+        del waiting[:ready]
+
+
+def _entries(stream: BinaryIO, offset: int, wanted: Callable[[int, int], bool]) -> Iterator[Entry]:
+    stream.seek(offset + _RECORD.size)
+    chunk = Chunk.read(ReadDataStream(stream))
+    uncompressed, size = get_chunk_data_stream(chunk, validate_crc=True)
+    data = uncompressed.read(size)
+    at = 0
+    while at < size:
+        opcode, length = _RECORD.unpack_from(data, at)
+        at += _RECORD.size
+        if at + length > size:
+            raise ValueError("a record is longer than the chunk that it is in")
+        if opcode == Opcode.MESSAGE:
+            channel_id, sequence, log_ns, publish_ns = _MESSAGE.unpack_from(data, at)
+            if wanted(channel_id, log_ns):
+                payload = data[at + _MESSAGE.size : at + length]
+                yield Entry(log_ns, offset, at, channel_id, sequence, publish_ns, payload)
+        at += length
