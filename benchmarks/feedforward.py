@@ -23,7 +23,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from formation.angles import FloatArray
 from hil.errors import CheckFailedError
 from hil.scenario.files import load_scenario
-from hil.sweep.engine import Engine, evaluation_ns
+from hil.sweep.engine import Engine
+from hil.sweep.engine_rules import evaluation_ns
 
 LAWS = ("independent", "feedforward", "faded")
 POSITIONS_MM = (0.3, 1.0, 2.0, 5.0, 10.0, 20.0)

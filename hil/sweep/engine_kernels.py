@@ -1,9 +1,9 @@
 """The closed loop of a run in lockstep, compiled: emulator, estimator, prediction, law, guard, all in one.
 
 It does what the nodes do on a simulated clock, event by event and to the nanosecond, without messages; a test
-holds it to a lockstep run of the same seed. What it leaves out, :mod:`hil.sweep.engine` refuses. The names of
-the functions are those of the code that they stand for: ``_follow`` is ``Tracker.follow``, ``_capture`` is
-``EmulatorNode._capture``, and so on.
+holds it to a lockstep run of the same seed. What it leaves out, :mod:`hil.sweep.engine_rules` refuses. The
+names of the functions are those of the code that they stand for: ``_follow`` is ``Tracker.follow``,
+``_capture`` is ``EmulatorNode._capture``, and so on.
 
 All of it is in this one file, long as that makes it, because the cache of compiled code looks at the file of
 a kernel only: what it called from elsewhere could change unnoticed.

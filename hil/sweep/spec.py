@@ -17,7 +17,7 @@ from hil.errors import UsageError
 from hil.scenario.checked_toml import checked, locate, read_toml
 from hil.scenario.files import load_scenario, with_overrides
 from hil.scenario.schema import NonNegative, Positive, Probability, Scenario
-from hil.sweep.engine import KINDS, refuse_unknown
+from hil.sweep.engine_rules import KINDS, refuse_unknown
 
 SHORTEST_S = 1.0
 """Shortest run that a sweep takes: the judge looks at its second half."""

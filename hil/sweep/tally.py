@@ -23,7 +23,8 @@ from hil.judge.true_states import TrueStates
 from hil.scenario.files import build_scenario, scenario_text, with_overrides
 from hil.scenario.schema import Scenario
 from hil.sweep import engine_kernels as kernels
-from hil.sweep.engine import Engine, Flight, evaluation_ns
+from hil.sweep.engine import Engine, Flight
+from hil.sweep.engine_rules import evaluation_ns
 
 BOUNDS = tuple(QUANTITY_OF)
 _COUNT, _MEASURE = np.int64, np.float64
