@@ -52,6 +52,10 @@ ROWS: Mapping[str, Sequence[str]] = {
     "transport assumed 30 ms long": ("controller.transport_s=0.03",),
     "stamps 30 ms late": ("mocap.clock_offset_s=0.03",),
     "stamps 30 ms early": ("mocap.clock_offset_s=-0.03",),
+    "stamps 30 ms late, clock estimated": (
+        *("mocap.clock_offset_s=0.03", "estimator.clock=estimated"),
+        "estimator.transport_latency_s=0.03",
+    ),
     "lag assumed 50 ms": ("controller.lag_s=0.05",),
     **{
         f"latency 0.8 s, lag {lag:g} s": (
