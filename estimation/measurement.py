@@ -71,6 +71,15 @@ def measure_world(
     return Measurement(capture_ns, np.array(leader), covariance, motion, follower, noise, seen)
 
 
+def from_sensor(rho: float, alpha2: float, place: tuple[float, float]) -> tuple[float, float]:
+    """Range [m] and bearing [rad] from the follower's wheel axis, out of those from a sensor's place.
+
+    place: [m] ahead of the axis' middle and to the left of it; the sensor's axes are the follower's.
+    """
+    x, y = place[0] + rho * math.cos(alpha2), place[1] + rho * math.sin(alpha2)
+    return math.hypot(x, y), math.atan2(y, x)
+
+
 def measure_body(
     capture_ns: int, rho: float, alpha2: float, sd_rho: float, sd_alpha2: float, motion: FollowerMotion
 ) -> Measurement:

@@ -17,6 +17,7 @@ from estimation.measurement import (
     FrontEnd,
     Measurement,
     PoseNoise,
+    from_sensor,
     measure_body,
     measure_body_from_mocap,
     measure_world,
@@ -174,6 +175,8 @@ class EstimatorNode:
         rho, alpha2 = sighting.rho - given.range_bias, float(wrap(sighting.alpha2 - given.bearing_bias))
         if rho <= 0.0:
             raise RefusedError("bad_range")
+        if given.sensor_x or given.sensor_y:
+            rho, alpha2 = from_sensor(rho, alpha2, (given.sensor_x, given.sensor_y))
         measurement = measure_body(
             sighting.capture_ns, rho, alpha2, given.sigma_range, given.sigma_bearing, motion
         )

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.sensor_bias import SensorBias, TooFewSightingsError, find_sensor_bias
-from formation.angles import FloatArray, wrap
+from formation.angles import FloatArray
 from hil.errors import UsageError
 from hil.log.events import logged_events
 from hil.log.metadata import IMPORT, mode_of
@@ -30,6 +30,8 @@ def calibrate(
 ) -> SensorBias:
     """Offsets of the sightings of a log, or of its span from ``from_s`` to ``to_s``.
 
+    They are those of a sensor that sits where the scenario says; a wrong place shows as a bearing that is off
+    by more the nearer the leader is.
     Times [s] are the source's own in an imported log, else they count from its first sighting. Poses are
     those of mocap frames, in a log without these those of its truth; they are taken linear between
     neighbours. Raises :class:`UsageError` for a log without sightings or without poses, and for a span that
@@ -65,9 +67,11 @@ def calibrate(
         if (from_s is None or capture_ns >= zero_ns + round(from_s * 1e9))
         and (to_s is None or capture_ns <= zero_ns + round(to_s * 1e9))
     ]
+    eye = scenario.estimator
+    true = _true(poses, [each.capture_ns for each in chosen], (eye.sensor_x, eye.sensor_y))
     seen = np.array([(each.rho, each.alpha2) for each in chosen]).reshape(-1, 2)
     try:
-        return find_sensor_bias(seen, _true(poses, [each.capture_ns for each in chosen]))
+        return find_sensor_bias(seen, true)
     except TooFewSightingsError as error:
         raise UsageError(f"log {log.path}: {error}; give a longer span") from None
 
@@ -82,13 +86,15 @@ def _poses(topic: str, payload: bytes, names: Topics, now_ns: int) -> Poses:
     return {to_ns(truth.header.stamp): told} if all(map(math.isfinite, told)) else {}
 
 
-def _true(poses: Poses, moments_ns: list[int]) -> FloatArray:
-    """True ranges and bearings (n, 2) at some moments, NaN where poses are not known."""
+def _true(poses: Poses, moments_ns: list[int], place: tuple[float, float]) -> FloatArray:
+    """True ranges and bearings (n, 2) from a place on the follower, NaN where poses are unknown."""
     stamps_ns = np.array(sorted(poses), dtype=np.int64)
     known = np.array([poses[stamp] for stamp in stamps_ns.tolist()])
     wanted: NDArray[np.int64] = np.array(moments_ns, dtype=np.int64)
     follower = poses_at(stamps_ns, known[:, 2:5], wanted)
     leader = poses_at(stamps_ns, np.column_stack([known[:, 0:2], np.zeros(len(known))]), wanted)
     away = leader[:, 0:2] - follower[:, 0:2]
-    bearing = wrap(np.arctan2(away[:, 1], away[:, 0]) - follower[:, 2])
-    return np.column_stack([np.hypot(away[:, 0], away[:, 1]), bearing])
+    cos, sin = np.cos(follower[:, 2]), np.sin(follower[:, 2])
+    ahead = cos * away[:, 0] + sin * away[:, 1] - place[0]
+    left = cos * away[:, 1] - sin * away[:, 0] - place[1]
+    return np.column_stack([np.hypot(ahead, left), np.arctan2(left, ahead)])

@@ -199,7 +199,9 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``input_delay_s`` after its signal, and up to ``input_lag_s`` later still.
     ``own_motion``: where v2 and u2 come from: odometry, the follower's own mocap track, or both fused.
     ``sigma_range``, ``sigma_bearing``: of a body-frame sensor; for mocap they follow from the geometry.
-    ``range_bias`` [m], ``bearing_bias`` [rad]: by how much such a sensor's values are above the true ones.
+    ``sensor_x``, ``sensor_y``: how far [m] such a sensor sits ahead of the middle of the follower's wheel
+    axis and to its left. ``range_bias`` [m], ``bearing_bias`` [rad]: by how much its values are above the
+    true ones.
     ``bias_states``: estimate what is left of these offsets, known beforehand to ``sigma_range_bias`` [m] and
     ``sigma_bearing_bias`` [rad], wherever the motion of the pair tells them (``ekf`` on the body front end).
     ``turn_bandwidth``: q_u = turn_bandwidth * k_u^2 per second (0.5 agile, 0.03 gentle leaders).
@@ -222,6 +224,8 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     sigma_heading: Positive = 0.0035
     sigma_range: Positive = 0.01
     sigma_bearing: Positive = 0.02
+    sensor_x: float = 0.0
+    sensor_y: float = 0.0
     range_bias: float = 0.0
     bearing_bias: float = 0.0
     bias_states: bool = False

@@ -40,6 +40,7 @@ _KNOWN = {
         *("kind", "sigma_position", "sigma_heading", "sigma_range", "sigma_bearing", "sigma_v2", "sigma_u2"),
         *("turn_bandwidth", "speed_bandwidth", "gate_probability", "reacquire_frames", "coast_after_s"),
         *("lost_after_s", "window_s", "difference_cutoff_s", "range_bias", "bearing_bias"),
+        *("sensor_x", "sensor_y"),
     },
 }
 """Keys that the compiled loop knows, or may ignore as they concern no world front end."""

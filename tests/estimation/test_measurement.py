@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import cmath
 import math
 
 import numpy as np
@@ -7,7 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimation.measurement import PoseNoise, measure_body, measure_body_from_mocap, measure_world
+from estimation.measurement import (
+    PoseNoise,
+    from_sensor,
+    measure_body,
+    measure_body_from_mocap,
+    measure_world,
+)
 from estimation.motion import FollowerMotion
 from formation.pose import Pose
 from formation.shape import Shape, follower_pose
@@ -62,3 +69,19 @@ def test_mocap_noise_seen_from_the_body_is_what_drawing_it_gives() -> None:
     claimed = measure_body_from_mocap(0, leader, follower, noise, STANDING).covariance
     # The relative standard error of a variance from so many draws is 0.7 %.
     assert claimed == pytest.approx(drawn, abs=0.03 * float(np.trace(drawn)))
+
+
+@given(
+    rho=st.floats(0.1, 5.0),
+    alpha2=st.floats(-math.pi, math.pi),
+    x=st.floats(-0.3, 0.3),
+    y=st.floats(-0.3, 0.3),
+)
+def test_what_a_sensor_sees_is_told_from_the_wheel_axis(
+    rho: float, alpha2: float, x: float, y: float
+) -> None:
+    seen = from_sensor(rho, alpha2, (x, y))
+    leader = cmath.rect(rho, alpha2) + complex(x, y)
+    assert cmath.rect(*seen) == pytest.approx(leader, abs=1e-12)
+    assert seen[0] >= 0.0
+    assert from_sensor(rho, 0.0, (x, 0.0))[0] == pytest.approx(abs(rho + x))

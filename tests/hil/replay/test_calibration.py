@@ -25,6 +25,7 @@ from hil.scenario.schema import Scenario
 
 REAL = "ABREAST_REAL"
 RANGE_OFFSET, BEARING_OFFSET = 0.04, -0.2
+PLACE = (-0.09, 0.06)
 POSES = """leader_x = "x1"
 leader_y = "y1"
 leader_theta = "th1"
@@ -50,13 +51,18 @@ front_end = "body"
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A pair that drives for ten seconds; the follower sees the leader with offsets, once something else."""
-    path = tmp_path_factory.mktemp("lab") / "lab.csv"
+    return recorded(tmp_path_factory.mktemp("lab") / "lab.csv", (0.0, 0.0))
+
+
+def recorded(path: Path, place: tuple[float, float]) -> Path:
+    """Recording of a sensor at a place on the follower, ahead and to the left."""
     generator = np.random.default_rng(4)
     leader, follower = Pose(0.6, 0.2, 0.1), Pose(0.0, 0.0, 0.3)
     lines = ["t,rho,alpha2,v2,u2,x1,y1,th1,x2,y2,th2"]
     for k in range(200):
         own = Motion(0.12, 0.5 * math.sin(0.05 * k))
-        shape = shape_of(leader, follower)
+        at = follower.x + 1j * follower.y + complex(*place) * np.exp(1j * follower.theta)
+        shape = shape_of(leader, Pose(at.real, at.imag, follower.theta))
         stray = 0.8 if k == 60 else 0.0
         rho = shape.rho + RANGE_OFFSET + stray + 0.003 * generator.standard_normal()
         alpha2 = wrap(shape.alpha2 + BEARING_OFFSET + stray + 0.01 * generator.standard_normal())
@@ -99,6 +105,18 @@ def test_offsets_found_in_one_span_make_the_rest_of_the_log_better(recording: Pa
     assert alpha1_rmse(log, scenario, found) < 0.5 * alpha1_rmse(log, scenario, None)
 
 
+def test_offsets_are_those_of_a_sensor_at_the_place_that_is_told(tmp_path: Path) -> None:
+    log, scenario = imported(recorded(tmp_path / "lab.csv", PLACE), CHART, tmp_path)
+    placed = with_overrides(
+        scenario, [f"estimator.sensor_{axis}={at}" for axis, at in zip("xy", PLACE, strict=True)]
+    )
+    found, blind = calibrate(log, placed, to_s=105.0), calibrate(log, scenario, to_s=105.0)
+    assert found.range.value == pytest.approx(RANGE_OFFSET, abs=2e-3)
+    assert found.bearing.value == pytest.approx(BEARING_OFFSET, abs=4e-3)
+    # Without the place the offsets make up for it in the calibrated span only.
+    assert alpha1_rmse(log, placed, found) < 0.8 * alpha1_rmse(log, scenario, blind)
+
+
 def test_a_log_that_cannot_tell_is_refused(recording: Path, tmp_path: Path) -> None:
     log, scenario = imported(recording, CHART.replace(POSES, ""), tmp_path)
     with pytest.raises(UsageError, match="has no poses of 'leader' and 'follower' beside its sightings"):
@@ -119,7 +137,8 @@ def test_the_first_seconds_of_a_real_log_calibrate_its_scanner(tmp_path: Path) -
     scenario = scenario_of(log)
     assert scenario is not None
     found = calibrate(log, scenario, to_s=6.6)
-    assert found.range.value == pytest.approx(-0.028, abs=4e-3)
-    assert found.bearing.value == pytest.approx(-0.06, abs=1e-2)
+    # The scanner sits 32 mm behind the axis, and what it sees of the leader is 60 mm nearer than its centre.
+    assert found.range.value == pytest.approx(-0.06, abs=4e-3)
+    assert found.bearing.value == pytest.approx(-0.037, abs=1e-2)
     assert alpha1_rmse(log, scenario, None) <= 0.12
     assert alpha1_rmse(log, scenario, found) <= 0.06
