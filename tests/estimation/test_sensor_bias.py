@@ -18,7 +18,7 @@ def sightings(
     """Noisy sightings with offsets, a share of them of something else, and what they should have been."""
     true = np.column_stack([generator.uniform(0.2, 2.0, count), generator.uniform(-math.pi, math.pi, count)])
     seen = true + offset + generator.standard_normal((count, 2)) * [0.002, 0.01]
-    strays = generator.random(count) < wrong
+    strays = generator.permutation(count) < round(wrong * count)
     seen[strays] += generator.uniform(0.3, 1.5, (int(strays.sum()), 2))
     seen[:, 1] = wrap(seen[:, 1])
     return seen, true
