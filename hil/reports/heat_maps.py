@@ -20,7 +20,7 @@ from hil.reports.run_tables import QUANTITIES, scale_of
 Cell = Mapping[str, Any]
 
 _NOTHING = ("#ffffff", DARK, "")
-_HEIGHT_OF_ROW, _HEIGHT_OF_REST = 38, 64
+_HEIGHT_OF_ROW, _HEIGHT_OF_LABEL, _HEIGHT_OF_REST = 38, 130, 64
 _BRIGHT = 0.18
 """Relative luminance above which black letters stand out more than white ones."""
 
@@ -147,7 +147,7 @@ def _map(
     estimator: str, data: Mapping[str, list[str]], rows: Sequence[str], columns: Sequence[str], merit: Merit
 ) -> Panel:
     plot = blank(
-        height=_HEIGHT_OF_REST + _HEIGHT_OF_ROW * len(rows),
+        height=_HEIGHT_OF_REST + max(_HEIGHT_OF_ROW * len(rows), _HEIGHT_OF_LABEL),
         x_label="heading noise [deg]",
         y_label="position noise [mm]",
         tools="",
