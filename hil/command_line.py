@@ -40,8 +40,9 @@ class _LazyGroup(click.Group):
         if cmd_name not in COMMANDS:
             return None
         if cmd_name in _DAEMONS:
-            module = importlib.import_module("hil.commands.daemon")
-            return module.daemon_command(cmd_name, COMMANDS[cmd_name])  # type: ignore[no-any-return]
+            from hil.commands.daemon import daemon_command
+
+            return daemon_command(cmd_name, COMMANDS[cmd_name])
         module = importlib.import_module(f"hil.commands.{_MODULES.get(cmd_name, cmd_name)}")
         command: click.Command = module.command
         return command

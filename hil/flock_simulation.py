@@ -73,7 +73,7 @@ def _flown(scenario: Scenario, flock: FlockSection) -> tuple[FloatArray, FlockTr
             scenario_parts.limits(scenario),
             Choice(flock.neighbours, flock.choose_every_s, flock.least_bearing),
             scenario.run.duration_s,
-            knows_turn=scenario.controller.law != "independent",
+            knows_turn=scenario_parts.knows_turn(scenario),
         )
     except ValueError as error:
         raise UsageError(f"scenario {scenario.name}: {error}; correct [flock] or run.duration_s") from None

@@ -1,27 +1,47 @@
-"""What is left beside the log of a run: its summary, its picture and its report."""
+"""What is left beside the log of a run or a replay: its summary, its picture and its report."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from hil.log.reader import Log
+from hil.errors import UsageError
 from hil.report_json import write_json
+
+if TYPE_CHECKING:
+    from hil.judge.evidence import Evidence
+    from hil.log.reader import Log
+
+
+def made_folder(folder: Path) -> Path:
+    """The folder of --out, made with all above it; raises :class:`UsageError` if it cannot be."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"--out {folder}: cannot be made ({error.strerror}); give another folder") from None
+    return folder
 
 
 def judge_log(log: Log, folder: Path) -> dict[str, Any]:
     """Summary of the log of a pair; ``summary.json``, ``run.png`` and ``report.html`` go into the folder."""
-    # All that judging and drawing need: a second of imports, for those who ask only.
-    from hil.figures.run_figures import draw_run
-    from hil.figures.shown import Shown
     from hil.judge.evidence import evidence_of_log
     from hil.judge.summary import summarise
-    from hil.reports.run_report import run_report
 
     evidence = evidence_of_log(log)
     summary = summarise(evidence)
+    leave(evidence, summary, folder, "run.png")
+    return summary
+
+
+def leave(evidence: Evidence, summary: Mapping[str, Any], folder: Path, picture: str) -> None:
+    """Write the summary of an evidence, its picture by the given name, and its report."""
+    # All that drawing needs: a second of imports, for those who ask only.
+    from hil.figures.run_figures import draw_run
+    from hil.figures.shown import Shown
+    from hil.reports.run_report import run_report
+
     write_json(summary, folder / "summary.json")
     shown = Shown.of(evidence)
-    draw_run(shown, summary, folder / "run.png")
+    draw_run(shown, summary, folder / picture)
     (folder / "report.html").write_text(run_report(shown, summary), encoding="utf-8")
-    return summary

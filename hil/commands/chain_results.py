@@ -9,18 +9,25 @@ from typing import Any
 
 import click
 
-from hil.errors import CheckFailedError, UsageError
+from hil.errors import CheckFailedError
 from hil.judge.chain_pairs import driven_trajectory
 from hil.judge.chain_summary import summarise_chain
 from hil.judge.chain_text import print_chain
 from hil.judge.evidence import Evidence, evidence_of_link
+from hil.judged_log import made_folder
 from hil.log.metadata import scenario_of
 from hil.log.reader import Log
 from hil.replay.estimate_csv import write_estimates
 from hil.replay.rerun import replay_chain
-from hil.replay.verdict import evaluated, evidence_of_replay, parity_json, violated_bounds, why_not_same
+from hil.replay.verdict import (
+    evaluated,
+    evidence_of_replay,
+    parity_json,
+    refuse_other_steps,
+    violated_bounds,
+    why_not_same,
+)
 from hil.report_json import print_json, write_json
-from hil.scenario.certify import same_steps
 from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
 
@@ -54,11 +61,8 @@ def judge_run(log: Log, scenario: Scenario, folder: Path) -> dict[str, Any]:
 def replay_run(log: Log, chosen: Scenario, wishes: Wishes) -> None:
     """Replay the log of a chain by a scenario, and do with the result what is wished."""
     own = scenario_of(log)
-    if wishes.verify and own is not None and not same_steps(chosen, own):
-        raise UsageError(
-            "--verify compares with what was recorded, with the log's own settings; leave out what changes "
-            "them"
-        )
+    if wishes.verify and own is not None:
+        refuse_other_steps(chosen, own)
     played = replay_chain(log, chosen)
     evidences = [evidence_of_replay(log, each, wishes.from_s, wishes.to_s) for each in played]
     summary = summarise_chain(chosen, evidences)
@@ -67,8 +71,7 @@ def replay_run(log: Log, chosen: Scenario, wishes: Wishes) -> None:
         for pair, each in zip(summary["pairs"], played, strict=True):
             pair["parity"] = parity_json(each)
     if wishes.out is not None:
-        _make(wishes.out)
-        _write(chosen, evidences, summary, wishes.out, "replay.png")
+        _write(chosen, evidences, summary, made_folder(wishes.out), "replay.png")
         for evidence in evidences:
             name = evidence.scenario.follower.name
             write_estimates(evaluated(evidence), wishes.out / f"estimates-{name}.csv")
@@ -93,13 +96,6 @@ def _write(
     from hil.figures.chain_figures import draw_chain
 
     draw_chain(scenario, trajectory, float(trajectory.t[-1]), folder / picture)
-
-
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(f"--out {folder}: cannot be made ({error.strerror}); give another folder") from None
 
 
 def _refuse_violated(log: Log, summary: dict[str, Any]) -> None:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hil.errors import CheckFailedError, UsageError
-from hil.report_json import print_json, write_json
+from hil.judged_log import leave, made_folder
+from hil.report_json import print_json
 from hil.scenario.certify import CERTIFY, same_steps
 
 if TYPE_CHECKING:
@@ -110,6 +111,7 @@ def _played(
     from hil.log.metadata import scenario_of
     from hil.replay.rerun import replay, replay_foreign, replay_link
     from hil.replay.topic_map import load_topic_map
+    from hil.replay.verdict import refuse_other_steps
     from hil.scenario.files import with_overrides
     from hil.scenario.links import chain_of, link_of
 
@@ -124,11 +126,8 @@ def _played(
     if chain_of(own) is not None and follower is not None:
         _refuse_leader(leader)
         link, was = link_of(with_overrides(own, kind), follower), link_of(own, follower)
-        if verify and not same_steps(link.scenario, was.scenario):
-            raise UsageError(
-                "--verify compares with what was recorded, with the log's own settings; leave out what "
-                "changes them"
-            )
+        if verify:
+            refuse_other_steps(link.scenario, was.scenario)
         return replay_link(log, link, was)
     names = {"leader.name": leader, "follower.name": follower}
     renamed = [f"{key}={name}" for key, name in names.items() if name is not None]
@@ -180,16 +179,5 @@ def _write(evidence: Evidence, summary: dict[str, Any], table: Path | None, out:
         write_estimates(evaluated(evidence), table)
     if out is None:
         return
-    from hil.figures.run_figures import draw_run
-    from hil.figures.shown import Shown
-    from hil.reports.run_report import run_report
-
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(f"--out {out}: cannot be made ({error.strerror}); give another folder") from None
-    write_json(summary, out / "summary.json")
-    write_estimates(evaluated(evidence), out / "estimates.csv")
-    shown = Shown.of(evidence)
-    draw_run(shown, summary, out / "replay.png")
-    (out / "report.html").write_text(run_report(shown, summary), encoding="utf-8")
+    write_estimates(evaluated(evidence), made_folder(out) / "estimates.csv")
+    leave(evidence, summary, out, "replay.png")

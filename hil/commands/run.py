@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from hil.errors import CheckFailedError, UsageError
+from hil.judged_log import judge_log, made_folder
 from hil.report_json import print_json
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario, refuse_unrunnable
@@ -77,12 +78,7 @@ def command(
 
 
 def _folder(scenario: Scenario, out: Path | None) -> Path:
-    folder = out or Path("runs") / f"{scenario.name}-{time.strftime('%Y%m%d-%H%M%S')}"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(f"--out {folder}: cannot be made ({error.strerror}); give another folder") from None
-    return folder
+    return made_folder(out or Path("runs") / f"{scenario.name}-{time.strftime('%Y%m%d-%H%M%S')}")
 
 
 def _lockstep(scenario: Scenario, log_path: Path) -> str:
@@ -142,7 +138,6 @@ def _make_whole(log_path: Path) -> None:
 def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
     """Judge the log, leave summary, picture and report beside it, and print the verdict."""
     from hil.judge.summary_text import print_summary
-    from hil.judged_log import judge_log
     from hil.log.metadata import scenario_of
     from hil.log.reader import read_log
 

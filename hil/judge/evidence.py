@@ -159,7 +159,8 @@ def evidence_of_log(log: Log, scenario: Scenario | None = None) -> Evidence:
 def evidence_of_link(log: Log, link: Link) -> Evidence:
     """Evidence of what a log recorded of one follower of a chain, or of a pair.
 
-    For a predecessor that no program drives the certificate is there: it assumes the limits alone.
+    For a predecessor that no program drives the certificate is there: it assumes the limits alone. In a chain
+    nobody takes orders to change sides.
     """
     scenario, names = link.scenario, link_topics(link)
     records = _records(log, names)
@@ -181,7 +182,7 @@ def evidence_of_link(log: Log, link: Link) -> Evidence:
         stopped_ns=records[topics.STOP][0].log_ns if records[topics.STOP] else None,
         frames=_frames(scenario, arrivals, truth),
         arrivals=arrivals,
-        orders=orders_of(scenario, _timed(log, records[names.side], String)),
+        orders=() if link.in_chain else orders_of(scenario, _timed(log, records[names.side], String)),
         certified=_decoded(log, records[names.certified], CertifiedEstimate),
         log=LogFacts(str(log.path), log.messages, log.path.stat().st_size),
         certificate=None if link.first else certificate_json(certificate_of(scenario, driven=False)),

@@ -6,10 +6,12 @@ import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from controllers.laws import Gains
+from controllers.station_keeper import StationKeeper
 from formation.angles import FloatArray, wrap
 from formation.pose import Motion
 from formation.shape import Shape, shape_rates
@@ -91,8 +93,7 @@ def _integrate(
 ) -> list[_State]:
     """States after every step, the first included; ``driven``: the leader's motion at every half step."""
     keeper = station_keeper(scenario)
-    law, within, keeping = keeper.law, keeper.limits, keeper.begin()
-    states, waiting = [start], deque(orders)
+    keeping, states, waiting = keeper.begin(), [start], deque(orders)
     for k in range(0, len(driven) - 1, 2):
         while waiting and waiting[0][0] <= 0.5 * k * step:
             keeping = replace(keeping, ordered=waiting.popleft()[1])
@@ -100,19 +101,21 @@ def _integrate(
         held = None
         if keeping.waits or not keeping.change.arrived:
             keeping, wanted = keeper.drive(keeping, _shape(state), leader, leader.u, step)
-            held = None if keeping.change.arrived else within.apply(wanted)[0]
-        at_station = replace(keeper.gains, station=keeping.change.station)
-
-        def rates(
-            state: _State, leader: Motion, held: Motion | None = held, at_station: Gains = at_station
-        ) -> _State:
-            shape = _shape(state)
-            follower = held or within.apply(law(shape, leader.v, leader.u, at_station, within))[0]
-            change = shape_rates(shape, leader, follower)
-            return change.rho_dot / shape.rho, change.alpha1_dot, change.alpha2_dot
-
+            held = None if keeping.change.arrived else keeper.limits.apply(wanted)[0]
+        rates = partial(_rates, keeper, replace(keeper.gains, station=keeping.change.station), held)
         states.append(_stepped(rates, state, driven[k : k + 3], step))
     return states
+
+
+def _rates(
+    keeper: StationKeeper, at_station: Gains, held: Motion | None, state: _State, leader: Motion
+) -> _State:
+    """Rates under the law at a station, or under a motion that is held on the way to one."""
+    shape, within = _shape(state), keeper.limits
+    if held is None:
+        held, _ = within.apply(keeper.law(shape, leader.v, leader.u, at_station, within))
+    change = shape_rates(shape, leader, held)
+    return change.rho_dot / shape.rho, change.alpha1_dot, change.alpha2_dot
 
 
 def _stepped(

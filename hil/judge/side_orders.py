@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.side_change import gentle
 from formation.angles import FloatArray
 from formation.station import Side, Station
 from hil.judge.true_states import Stamps
-from hil.scenario.parts import gains, station
+from hil.scenario.parts import may_change_sides, station
 from hil.scenario.schema import Scenario
 from hil.wire.message_types import String
 
@@ -26,7 +25,7 @@ class Order:
 
 def orders_of(scenario: Scenario, given: Sequence[tuple[int, String]]) -> tuple[Order, ...]:
     """Orders out of what was sent, without those that the controller refuses."""
-    if not gentle(scenario.leader.k_v, scenario.leader.k_u, gains(scenario)):
+    if not may_change_sides(scenario):
         return ()
     words = {side.value: side for side in Side}
     return tuple(Order(given_ns, words[text.data]) for given_ns, text in given if text.data in words)

@@ -10,7 +10,6 @@ from msgspec.structs import replace
 
 from controllers.guard import Decision, decide
 from controllers.resolution import NOTHING_OWED, Resolution
-from controllers.side_change import gentle
 from controllers.station_keeper import Keeping
 from estimation.estimate import Estimate
 from estimation.foresight import TurnTrend
@@ -30,7 +29,7 @@ from hil.nodes.node import (
     no_counts,
     outgoing,
 )
-from hil.scenario.parts import gains, limits, station_keeper
+from hil.scenario.parts import limits, may_change_sides, station_keeper
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -85,7 +84,7 @@ class ControllerNode:
         self.name = name
         self.topics = topics_of(scenario)
         self.keeper, self.limits = station_keeper(scenario), limits(scenario)
-        self.leader_is_gentle = gentle(scenario.leader.k_v, scenario.leader.k_u, gains(scenario))
+        self.leader_is_gentle = may_change_sides(scenario)
         self.resolution = Resolution(given.v_resolution, given.u_resolution)
         self.max_age = given.max_age_s
         self.lag = given.lag_s

@@ -13,11 +13,22 @@ from hil.log.metadata import IMPORT, mode_of
 from hil.log.reader import Log
 from hil.replay.journal import Parity
 from hil.replay.rerun import Replay
+from hil.scenario.certify import same_steps
 from hil.scenario.links import Link
+from hil.scenario.schema import Scenario
 from hil.wire.message_types import LeaderEstimate
 from hil.wire.messages import to_ns
 
 _CALLED = {"certified": "certified estimates"}
+
+
+def refuse_other_steps(chosen: Scenario, own: Scenario) -> None:
+    """Raise :class:`UsageError` where --verify cannot compare: other settings make other estimates."""
+    if not same_steps(chosen, own):
+        raise UsageError(
+            "--verify compares with what was recorded, with the log's own settings; leave out what changes "
+            "them"
+        )
 
 
 def evidence_of_replay(

@@ -12,7 +12,7 @@ from formation.angles import FloatArray
 from formation.closed_loop import FollowerLaw, Trajectory, simulate_pair
 from formation.pose import Motion
 from formation.shape import Shape
-from hil.scenario.parts import gains, leader_program, limits
+from hil.scenario.parts import gains, knows_turn, leader_program, limits
 from hil.scenario.schema import Scenario
 from hil.scenario.start import start_poses, start_shape
 
@@ -45,7 +45,7 @@ def noise_free_run(scenario: Scenario, times: FloatArray) -> Trajectory:
         limits(scenario),
         changes,
         times,
-        knows_turn=scenario.controller.law != "independent",
+        knows_turn=knows_turn(scenario),
     )
 
 
@@ -63,5 +63,5 @@ def chain_run(scenario: Scenario, agents: int, times: FloatArray) -> ChainTrajec
         gains(scenario),
         limits(scenario),
         times,
-        knows_turn=scenario.controller.law != "independent",
+        knows_turn=knows_turn(scenario),
     )

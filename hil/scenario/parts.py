@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from controllers.laws import LAWS, Gains
 from controllers.limits import Limits
+from controllers.side_change import gentle
 from controllers.station_keeper import StationKeeper
 from estimation.foresight import Foresight
 from estimation.motion import LeaderLimits, ProcessNoise
@@ -50,10 +51,20 @@ def limits(scenario: Scenario) -> Limits:
     return Limits(scenario.controller.v_max, scenario.controller.u_max)
 
 
+def knows_turn(scenario: Scenario) -> bool:
+    """Whether the scenario's law makes use of the leader's turn rate."""
+    return scenario.controller.law != "independent"
+
+
+def may_change_sides(scenario: Scenario) -> bool:
+    """Whether the leader, at its fastest, turns gently enough for the follower to be led round it."""
+    return gentle(scenario.leader.k_v, scenario.leader.k_u, gains(scenario))
+
+
 def station_keeper(scenario: Scenario) -> StationKeeper:
     """The scenario's law at the follower's station, whichever side that comes to be on."""
-    law = scenario.controller.law
-    return StationKeeper(LAWS[law], gains(scenario), limits(scenario), knows_turn=law != "independent")
+    law = LAWS[scenario.controller.law]
+    return StationKeeper(law, gains(scenario), limits(scenario), knows_turn=knows_turn(scenario))
 
 
 def foresight(scenario: Scenario) -> Foresight:
