@@ -1,4 +1,4 @@
-"""A scenario's certificate from a process of its own, at the lowest priority: the run goes first."""
+"""A scenario's certificate from a process of its own, which steps aside for the run."""
 
 from __future__ import annotations
 
@@ -12,13 +12,18 @@ from hil.log.metadata import certificate_metadata
 from hil.scenario.files import build_scenario, scenario_text
 from hil.scenario.schema import Scenario
 
+_LOWEST_PRIORITY = 19
+
 
 class CertificateProcess:
-    """Starts at once. The result can be had once; whoever can't wait for it goes without."""
+    """Starts at once. The result can be had once; whoever can't wait for it goes without.
 
-    def __init__(self, scenario: Scenario) -> None:
+    ``niceness``: what the process takes on top of ours; by default the run goes first, always.
+    """
+
+    def __init__(self, scenario: Scenario, niceness: int = _LOWEST_PRIORITY) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "hil.live.certificate_process"],
+            [sys.executable, "-m", "hil.live.certificate_process", str(niceness)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -49,8 +54,8 @@ class CertificateProcess:
             self._process.stdout.close()
 
 
-def _certify() -> None:
-    os.nice(19)
+def _certify(niceness: int) -> None:
+    os.nice(niceness)
     from hil.certificate import certificate_json, certificate_of
     from hil.report_json import as_json
 
@@ -59,4 +64,4 @@ def _certify() -> None:
 
 
 if __name__ == "__main__":
-    _certify()
+    _certify(niceness=int(sys.argv[1]))

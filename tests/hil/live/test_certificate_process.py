@@ -12,7 +12,7 @@ from tests.hil.live.child_run import PATIENCE
 
 def test_the_certificate_comes_once_and_is_the_scenario_s_own() -> None:
     scenario = load_scenario("turtlebot3", ["leader.k_u=0.6"])
-    process = CertificateProcess(scenario)
+    process = CertificateProcess(scenario, niceness=0)
     try:
         found = process.result(timeout=PATIENCE)
         assert json.loads(found[CERTIFICATE]["json"]) == known(certificate_json(certificate_of(scenario)))
