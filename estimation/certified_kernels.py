@@ -55,6 +55,8 @@ def intersect(
     if low > high:
         return ACCELERATION
     best_x, best_y = moved[best, 0] / back[best], moved[best, 1] / back[best]
+    # Directions are told from that of the best disc, and from the x axis where its centre is the origin.
+    ahead_x, ahead_y = (best_x, best_y) if best_x != 0.0 or best_y != 0.0 else (1.0, 0.0)
     left, right = -math.inf, math.inf
     for i in range(len(back)):
         x, y = moved[i, 0] / back[i], moved[i, 1] / back[i]
@@ -66,14 +68,14 @@ def intersect(
         if radius >= farther:
             continue
         half = math.asin(radius / farther)
-        offset = math.atan2(best_x * y - best_y * x, best_x * x + best_y * y)
+        offset = math.atan2(ahead_x * y - ahead_y * x, ahead_x * x + ahead_y * y)
         # Beyond half a turn about the best direction, intervals on the circle could meet twice.
         if abs(offset) + half < math.pi:
             left, right = max(left, offset - half), min(right, offset + half)
     if left > right:
         return ACCELERATION
     ranges[0], ranges[1] = low, high
-    direction = math.atan2(best_y, best_x)
+    direction = math.atan2(ahead_y, ahead_x)
     known = left > -math.inf
     ranges[2] = direction + 0.5 * (left + right) if known else direction
     ranges[3] = 0.5 * (right - left) if known else math.pi

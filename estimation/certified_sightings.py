@@ -133,9 +133,13 @@ def _driven(odometry: History, sampled: FloatArray, back: FloatArray) -> _Driven
     u = np.interp(moments, -sampled, np.array([sample.u2 for sample in odometry]))
     dt = np.diff(moments)
     heading = _summed(0.5 * (u[1:] + u[:-1]) * dt)
+    halfway = heading[:-1] + 0.125 * (3.0 * u[:-1] + u[1:]) * dt - heading[-1]
     heading -= heading[-1]
-    ahead, along = 0.5 * (heading[1:] + heading[:-1]), 0.5 * (v[1:] + v[:-1]) * dt
-    x, y = _summed(along * np.cos(ahead)), _summed(along * np.sin(ahead))
+    # Simpson's rule: with the mean heading alone, a turn rate that changes shows in what is certain.
+    half = 2.0 * (v[1:] + v[:-1])
+    ahead, aside = v * np.cos(heading), v * np.sin(heading)
+    x = _summed((ahead[1:] + half * np.cos(halfway) + ahead[:-1]) * dt / 6.0)
+    y = _summed((aside[1:] + half * np.sin(halfway) + aside[:-1]) * dt / 6.0)
     rows = np.searchsorted(moments, -back)
     return _Driven(x[rows] - x[-1], y[rows] - y[-1], heading[rows], float(np.max(np.abs(v))))
 

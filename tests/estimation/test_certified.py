@@ -40,6 +40,15 @@ def test_it_is_told_which_premise_fails(back: list[float], rows: FloatArray, exp
     assert certain_motion(np.array(back), rows, np.full(len(back), 2.0 * EPS), A, SPEEDS) is expected
 
 
+def test_a_displacement_of_nothing_has_no_direction() -> None:
+    """Positions in whole millimetres repeat; what shows where the leader drives are then the older ones."""
+    back, rows = np.array([0.5, 0.1]), moved((-0.006, 0.008), (0.0, 0.0))
+    found = certain_motion(back, rows, np.full(2, 1e-3), 0.05, (0.001, 0.3))
+    assert not isinstance(found, Failed)
+    assert found.direction.centre == pytest.approx(math.atan2(0.8, -0.6))
+    assert found.direction.half < 0.5 * math.pi
+
+
 def test_radius_is_the_distance_to_the_farthest_possible_value() -> None:
     assert Interval(1.0, 0.5).radius(2.0) == pytest.approx(1.5)
     assert Interval(3.1, 0.1).radius(-3.1, on_circle=True) == pytest.approx(0.1 + 2.0 * math.pi - 6.2)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Iterable
 
@@ -19,7 +20,7 @@ ERRORS = SightingErrors(E_rho=2e-3, E_alpha2=0.01, M_v2=3e-3, M_u2=0.02)
 K_V, K_U, V_EPS = 0.1, 0.7, 0.04
 STEP, STEP_NS, EPOCH_NS = 0.02, 20_000_000, 1_700_000_000_000_000_000
 FINE = 20
-ROUNDING = 1e-5  # dead reckoning takes arcs for chords
+ROUNDING = 1e-5  # the fine steps of the path are chords
 CERTIFIER = SightingCertifier(ERRORS, K_V * K_U, (V_EPS, K_V), 0.2, 0.22, STEP)
 
 
@@ -82,6 +83,29 @@ def test_the_truth_is_always_within_what_is_certain(
         assert abs(v1 - certain.v1.centre) <= certain.v1.half + ROUNDING
         alpha1 = float(np.angle(-line[tick]) - heading[tick])
         assert abs(wrap(alpha1 - certain.alpha1.centre)) <= certain.alpha1.half + ROUNDING
+
+
+def test_a_follower_that_swerves_between_rare_samples_takes_nothing_from_certainty() -> None:
+    """Exact odometry ten times a second, linear in between: what it says of the way is exact as well."""
+    exact, held = SightingErrors(1e-4, 1e-4, 2e-5, 2e-5), 5
+    certifier = SightingCertifier(exact, 0.005, (V_EPS, K_V), 0.2, 0.22, held * STEP)
+    ticks = np.arange(0, 101, held)
+    v2, u2 = 0.15 + 0.05 * (-1.0) ** np.arange(21), 2.5 * (-1.0) ** (np.arange(21) // 2)
+    fine = np.arange(0.5, 100 * FINE) / FINE
+    follower, own = path(np.interp(fine, ticks, v2), np.interp(fine, ticks, u2), 0.0)
+    leader = np.linspace(0.0, 0.06 * 100 * STEP, len(follower)) + 0.25j
+    captures = (EPOCH_NS + ticks * STEP_NS).tolist()
+    odometry = tuple(map(MotionSample, captures, v2.tolist(), u2.tolist()))
+    line = (leader - follower)[:: held * FINE] * np.exp(-1j * own[:: held * FINE])
+    known = NOTHING_RECENT
+    for row, (capture_ns, to_leader) in enumerate(zip(captures, line.tolist(), strict=True)):
+        known = certifier.add(known, capture_ns, abs(to_leader), cmath.phase(to_leader))
+        certain = certifier.certain(known, odometry[: row + 1], capture_ns)
+        if row:
+            assert isinstance(certain, Certain)
+            alpha1 = cmath.phase(-to_leader) + float(own[row * held * FINE])
+            assert abs(0.06 - certain.v1.centre) <= certain.v1.half
+            assert abs(wrap(alpha1 - certain.alpha1.centre)) <= certain.alpha1.half
 
 
 def abreast(frames: int) -> tuple[History, list[tuple[int, float, float]]]:
