@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import cycle
 
 import numpy as np
 
 from controllers.laws import LAWS, Gains
 from controllers.limits import Limits
+from controllers.side_change import CORRECTION
 from controllers.side_change_run import LONGEST_STEP, run_with_changes
+from controllers.station_keeper import StationKeeper
 from formation.leader import Table
 from formation.pose import Pose
 from formation.shape import Shape, follower_pose
 from formation.spacing import Spacing
-from formation.station import ABREAST
+from formation.station import ABREAST, Side
 
-LEADER_SHARE = 0.4
-"""Largest rho_0 |u1| of the leader, as a share of v1."""
 _WANDERING, _WHOLE, _KNOTS = 60.0, 120.0, 16
 
 
@@ -45,11 +46,12 @@ SETTINGS = (
 )
 
 
-def random_run(setting: Setting, seed: int, *, knows_turn: bool, share: float = LEADER_SHARE) -> Result:
+def random_run(setting: Setting, seed: int, *, knows_turn: bool, share: float = CORRECTION) -> Result:
     """Run number ``seed`` of a setting.
 
     It starts near the station on the right. The leader's turn rate wanders at random within ``share`` of
-    v1 / rho_0 and ends straight; one to five changes of side fall at any time of the wandering.
+    v1 / rho_0 and ends straight; one to five orders to change sides fall at any time of the wandering. They
+    are taken whatever the share.
     """
     random = np.random.default_rng([seed, int(knows_turn)])
     rho_0, v1 = setting.gains.spacing.rho_0, setting.v1
@@ -57,7 +59,8 @@ def random_run(setting: Setting, seed: int, *, knows_turn: bool, share: float = 
     knots = np.linspace(0.0, _WANDERING * unit, _KNOTS)
     turns = random.uniform(-1.0, 1.0, _KNOTS) * share * v1 / rho_0
     turns[-1] = 0.0
-    moments = random.uniform(0.0, _WANDERING * unit, random.integers(1, 6))
+    moments = np.sort(random.uniform(0.0, _WANDERING * unit, random.integers(1, 6)))
+    law = LAWS["ideal" if knows_turn else "independent"]
     start = Shape(
         rho_0 * random.uniform(0.8, 1.5),
         ABREAST.alpha1 + random.uniform(-0.5, 0.5),
@@ -68,12 +71,9 @@ def random_run(setting: Setting, seed: int, *, knows_turn: bool, share: float = 
         leader,
         follower_pose(start, leader),
         Table(knots.tolist(), [v1] * _KNOTS, turns.tolist()),
-        LAWS["ideal" if knows_turn else "independent"],
-        setting.gains,
-        setting.limits,
-        moments.tolist(),
+        StationKeeper(law, setting.gains, setting.limits, knows_turn=knows_turn, may_change=True),
+        list(zip(moments.tolist(), cycle((Side.LEFT, Side.RIGHT)), strict=False)),
         np.arange(0.0, _WHOLE * unit, LONGEST_STEP),
-        knows_turn=knows_turn,
     )
     off = abs(run.rho[-1] / rho_0 - 1.0) < 0.01
     off &= abs(math.cos(run.alpha1[-1])) < 0.01 and abs(math.cos(run.alpha2[-1])) < 0.01

@@ -32,18 +32,25 @@ class Keeping:
 class StationKeeper:
     """What the follower should drive, by a law at the side that was ordered last.
 
-    A change begins once the leader is seen to turn gently enough for :mod:`controllers.side_change` to hold;
-    after a stop it begins anew from where the pair then is. Unless ``knows_turn`` the leader's turn rate is
-    taken for 0 on the way.
+    Whoever lets a follower change sides, a daemon or a simulation, does so by this. Orders are taken only if
+    ``may_change``: the leader, at its fastest, turns gently enough for :mod:`controllers.side_change` to
+    hold. A change begins once it is seen to do so; after a stop it begins anew from where the pair then is.
+    Unless ``knows_turn`` the leader's turn rate is taken for 0 on the way.
     """
 
-    def __init__(self, law: Law, gains: Gains, limits: Limits, *, knows_turn: bool) -> None:
+    def __init__(self, law: Law, gains: Gains, limits: Limits, *, knows_turn: bool, may_change: bool) -> None:
         self.law, self.gains, self.limits = law, gains, limits
-        self.knows_turn = knows_turn
+        self.knows_turn, self.may_change = knows_turn, may_change
 
     def begin(self) -> Keeping:
         """At the station of the gains."""
         return Keeping(self.gains.station.side, kept(self.gains))
+
+    def told(self, keeping: Keeping, side: Side) -> Keeping | None:
+        """After an order to drive on a side; None where that would be an unsafe change, so is refused."""
+        if side is not keeping.ordered and not self.may_change:
+            return None
+        return replace(keeping, ordered=side)
 
     def drive(
         self, keeping: Keeping, shape: Shape, leader: Motion, u1: float, elapsed: float

@@ -15,6 +15,7 @@ from hil.errors import CheckFailedError, UsageError
 from hil.figures.simulation_figures import draw_experiment, draw_simulation
 from hil.scenario import parts as scenario_parts
 from hil.scenario.noise_free_runs import follower_law, noise_free_run
+from hil.scenario.ordered_sides import refusal
 from hil.scenario.schema import Scenario
 from hil.stability import PROVED_V1, stability_json, stability_of, write_stability
 
@@ -34,6 +35,8 @@ def simulate(scenario: Scenario, out: Path | None, *, stability: bool = False) -
     true region is larger). ``orbit.floquet`` is the largest modulus of the Floquet multipliers. The motion is
     not limited, as in the proofs.
 
+    Orders to change sides are treated as by the controller daemon; ``orders_refused`` says why, if they are.
+
     With ``stability``, ``stability`` too: the propositions checked by :mod:`hil.stability`, and its picture.
 
     Files: ``trajectory.csv`` and the pictures ``simulation.png`` (laid out like the paper's Fig. 2) and
@@ -51,6 +54,8 @@ def simulate(scenario: Scenario, out: Path | None, *, stability: bool = False) -
         else find_orbit(program, law, scenario.formation.rho_0, scenario_parts.station(scenario))
     )
     report = _report(scenario, trajectory, orbit)
+    if (why := refusal(scenario)) is not None:
+        report["orders_refused"] = why
     if out is not None:
         _write(scenario, trajectory, orbit, out)
     if stability:

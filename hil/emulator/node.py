@@ -15,7 +15,6 @@ from msgspec import Struct, field
 from msgspec.structs import replace
 
 from formation.pose import STANDSTILL, Motion, Pose
-from formation.station import Side
 from hil.emulator.faults import Pair, faulty
 from hil.emulator.lab_messages import frame_message, odometry_message, truth_message
 from hil.emulator.mocap import (
@@ -31,6 +30,7 @@ from hil.emulator.mocap import (
 from hil.emulator.robot import Actuators, Robot, drive
 from hil.nodes.node import Counts, Event, Outgoing, counted, diagnostics, named_counts, no_counts, outgoing
 from hil.scenario.links import links_of, node_names
+from hil.scenario.ordered_sides import ordered_sides
 from hil.scenario.parts import leader_program
 from hil.scenario.schema import Scenario
 from hil.scenario.start import chain_poses
@@ -100,7 +100,7 @@ class EmulatorNode:
         self.clock = CaptureClock(
             mocap.clock_offset_s, mocap.clock_drift_ppm * 1e-6, mocap.clock_jump_s, mocap.clock_jump_at_s
         )
-        self.changes_s = sorted(scenario.formation.change_sides_at_s)
+        self.orders = ordered_sides(scenario)
         self._handlers: dict[str, Callable[[EmulatorState, bytes, int], EmulatorState]] = {
             **{pair.cmd_vel: partial(self._on_command, k) for k, pair in enumerate(self.pairs, start=1)},
             topics.STOP: self._on_stop,
@@ -226,10 +226,9 @@ class EmulatorNode:
         if state.motion_since_ns is None or state.stopped:
             return state
         t = (state.time_ns - state.motion_since_ns) * _NS
-        while state.orders < len(self.changes_s) and t >= self.changes_s[state.orders]:
+        while state.orders < len(self.orders) and t >= self.orders[state.orders][0]:
+            order = msg.String(data=self.orders[state.orders][1].value)
             state = replace(state, orders=state.orders + 1)
-            side = Side(self.scenario.formation.side)
-            order = msg.String(data=(side.other if state.orders % 2 else side).value)
             out.append(outgoing(self.topics.side, order, state.time_ns))
         return state
 

@@ -96,7 +96,7 @@ def _integrate(
     keeping, states, waiting = keeper.begin(), [start], deque(orders)
     for k in range(0, len(driven) - 1, 2):
         while waiting and waiting[0][0] <= 0.5 * k * step:
-            keeping = replace(keeping, ordered=waiting.popleft()[1])
+            keeping = keeper.told(keeping, waiting.popleft()[1]) or keeping
         state, leader = states[-1], driven[k]
         held = None
         if keeping.waits or not keeping.change.arrived:

@@ -18,6 +18,7 @@ from hil.judge.estimation import judge_estimation
 from hil.judge.evidence import Evidence
 from hil.judge.formation import judge_formation
 from hil.report_json import known
+from hil.scenario.ordered_sides import refusal
 
 _STRANGERS = "unknown_body"
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "max": 100.0}
@@ -31,6 +32,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
     ``frames.rejected``: inputs that were refused, the robots' odometry included; frames that also held
     strangers do not count. ``commands``: those from when the leader set off to the stop. ``seed`` and ``law``
     are absent for recordings that were not driven by them. ``certified``: only where estimates are certified.
+    ``orders_refused``: why the scenario's own orders to change sides were, if they were.
     ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it.
     """
     columns = columns_of(evidence)
@@ -52,6 +54,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "latency_ms": _latency(columns),
         "clock": judge_clock(evidence.arrivals),
         "commands": _commands(columns),
+        "orders_refused": refusal(given) if driven else None,
         "rejected": dict(evidence.refused),
         "log": None if evidence.log is None else asdict(evidence.log),
     }

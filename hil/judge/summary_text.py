@@ -209,6 +209,8 @@ def _formation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
         yield f"in {commands['stopped'] / sent:.0%} of the commands the robot was told to stand still"
     if commands.get("saturated", 0) > SATURATED_SHARE * sent:
         yield f"{commands['saturated'] / sent:.0%} of the commands were at a limit of the robot"
+    if "orders_refused" in summary:
+        yield summary["orders_refused"]
 
 
 def _wire_warnings(summary: Mapping[str, Any]) -> Iterator[str]:

@@ -29,7 +29,7 @@ from hil.nodes.node import (
     no_counts,
     outgoing,
 )
-from hil.scenario.parts import limits, may_change_sides, station_keeper
+from hil.scenario.parts import limits, station_keeper
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -84,7 +84,6 @@ class ControllerNode:
         self.name = name
         self.topics = topics_of(scenario)
         self.keeper, self.limits = station_keeper(scenario), limits(scenario)
-        self.leader_is_gentle = may_change_sides(scenario)
         self.resolution = Resolution(given.v_resolution, given.u_resolution)
         self.max_age = given.max_age_s
         self.lag = given.lag_s
@@ -144,16 +143,16 @@ class ControllerNode:
 
     def _hear_order(self, state: ControllerState, payload: bytes) -> ControllerState:
         """Take an order, unless the leader may turn harder than a change of sides can make up for."""
-        keeping = state.keeping
         try:
             side = Side(decode_as(payload, msg.String).data)
         except MalformedPayloadError:
             return replace(state, refused=counted(state.refused, "malformed"))
         except ValueError:
             return replace(state, refused=counted(state.refused, "unknown_side"))
-        if side is not keeping.ordered and not self.leader_is_gentle:
+        keeping = self.keeper.told(state.keeping, side)
+        if keeping is None:
             return replace(state, refused=counted(state.refused, "unsafe_side_change"))
-        return replace(state, keeping=with_changes(keeping, ordered=side))
+        return replace(state, keeping=keeping)
 
     def _command(
         self, state: ControllerState, now_ns: int, *, fresh: bool

@@ -12,7 +12,8 @@ from formation.angles import FloatArray
 from formation.closed_loop import FollowerLaw, Trajectory, simulate_pair
 from formation.pose import Motion
 from formation.shape import Shape
-from hil.scenario.parts import gains, knows_turn, leader_program, limits
+from hil.scenario.ordered_sides import ordered_sides
+from hil.scenario.parts import gains, knows_turn, leader_program, limits, station_keeper
 from hil.scenario.schema import Scenario
 from hil.scenario.start import start_poses, start_shape
 
@@ -30,23 +31,16 @@ def follower_law(scenario: Scenario) -> FollowerLaw:
 def noise_free_run(scenario: Scenario, times: FloatArray) -> Trajectory:
     """Trajectory of the pair without noise, delay and limits, at the given times [s] from its start.
 
-    With changes of side it keeps to the limits, and commands are held between steps.
+    With orders to change sides it is the daemon's :class:`~controllers.station_keeper.StationKeeper` that
+    drives, so orders are taken or refused, and changes wait, as in a run with robots; it keeps to the limits,
+    and commands are held between steps.
 
     Raises :class:`~formation.closed_loop.IntegrationError` if the motion breaks down.
     """
-    program, changes = leader_program(scenario), scenario.formation.change_sides_at_s
-    if not changes:
+    program, orders = leader_program(scenario), ordered_sides(scenario)
+    if not orders:
         return simulate_pair(*start_poses(scenario), program, follower_law(scenario), times)
-    return run_with_changes(
-        *start_poses(scenario),
-        program,
-        LAWS[scenario.controller.law],
-        gains(scenario),
-        limits(scenario),
-        changes,
-        times,
-        knows_turn=knows_turn(scenario),
-    )
+    return run_with_changes(*start_poses(scenario), program, station_keeper(scenario), orders, times)
 
 
 def chain_run(scenario: Scenario, agents: int, times: FloatArray) -> ChainTrajectory:

@@ -63,8 +63,13 @@ def may_change_sides(scenario: Scenario) -> bool:
 
 def station_keeper(scenario: Scenario) -> StationKeeper:
     """The scenario's law at the follower's station, whichever side that comes to be on."""
-    law = LAWS[scenario.controller.law]
-    return StationKeeper(law, gains(scenario), limits(scenario), knows_turn=knows_turn(scenario))
+    return StationKeeper(
+        LAWS[scenario.controller.law],
+        gains(scenario),
+        limits(scenario),
+        knows_turn=knows_turn(scenario),
+        may_change=may_change_sides(scenario),
+    )
 
 
 def foresight(scenario: Scenario) -> Foresight:

@@ -22,12 +22,20 @@ V1 = 0.5
 TOO_HARD = 1.1 * CORRECTION * V1 / GAINS.spacing.rho_0
 
 
-def keeper(law: str = "independent") -> StationKeeper:
-    return StationKeeper(LAWS[law], GAINS, LIMITS, knows_turn=law != "independent")
+def keeper(law: str = "independent", *, may_change: bool = True) -> StationKeeper:
+    return StationKeeper(LAWS[law], GAINS, LIMITS, knows_turn=law != "independent", may_change=may_change)
 
 
 def ordered(side: Side) -> Keeping:
-    return replace(keeper().begin(), ordered=side)
+    keeping = keeper().told(keeper().begin(), side)
+    assert keeping is not None
+    return keeping
+
+
+def test_where_a_change_is_unsafe_an_order_for_another_side_is_refused() -> None:
+    strict = keeper(may_change=False)
+    assert strict.told(strict.begin(), Side.RIGHT) == strict.begin()
+    assert strict.told(strict.begin(), Side.LEFT) is None
 
 
 @given(

@@ -146,3 +146,9 @@ def test_told_to_change_sides_the_follower_ends_on_the_other() -> None:
     assert max(map(abs, report["extremes"]["v2"])) <= scenario.controller.v_max
     with pytest.raises(UsageError, match="--stability"):
         simulate(scenario, None, stability=True)
+
+
+def test_orders_that_a_controller_would_refuse_are_refused_here_and_it_is_said() -> None:
+    report = report_of("turtlebot3", "run.duration_s=8.0", "formation.change_sides_at_s=[2.0]")
+    assert math.sin(report["final"]["alpha1"]) < -0.8
+    assert "unsafe_side_change" in report["orders_refused"]

@@ -10,8 +10,10 @@ from controllers.laws import LAWS
 from formation.closed_loop import Trajectory, simulate_pair
 from formation.pose import Motion
 from formation.shape import Shape
+from formation.station import Side
 from hil.judge.evidence import Span
 from hil.judge.noise_free_orbit import noise_free_orbit
+from hil.judge.side_orders import Order
 from hil.judge.true_states import TrueStates
 from hil.scenario.files import load_scenario
 from hil.scenario.noise_free_runs import noise_free_run
@@ -39,6 +41,28 @@ def test_agrees_with_the_accurate_simulation_where_no_limit_is_met(name: str) ->
     assert np.max(np.abs(rho - run.rho)) < 2e-4 * run.rho.max()
     assert np.max(np.abs(np.sin(alpha1 - run.alpha1))) < 1e-3
     assert np.max(np.abs(np.sin(alpha2 - run.alpha2))) < 1e-3
+
+
+def test_a_change_waits_for_the_leader_as_in_the_simulation() -> None:
+    table = "t = [0.0, 4.0, 5.0], v = [0.5, 0.5, 0.5], u = [0.5, 0.5, 0.1]"
+    scenario = load_scenario(
+        "changing-sides",
+        [
+            *("formation.change_sides_at_s=[2.0]", "leader.k_u=0.6", "leader.k_v=0.8"),
+            f'leader.program={{kind = "table", {table}}}',
+        ],
+    )
+    run = noise_free_run(scenario, np.linspace(0.0, 15.0, 1501))
+    behind = np.cos(run.alpha1) < -0.9
+    assert run.t[behind][0] > 4.5
+    assert math.sin(run.alpha1[-1]) > 0.9
+    given = Order(T0 + 2_000_000_000, Side.LEFT)
+    orbit = noise_free_orbit(scenario, *told(run), [given])
+    assert orbit is not None
+    rho, alpha1, alpha2 = orbit.at(told(run)[0].capture_ns)
+    assert np.max(np.abs(rho - run.rho)) < 0.02 * scenario.formation.rho_0
+    assert np.max(np.abs(np.sin(alpha1 - run.alpha1))) < 0.05
+    assert np.max(np.abs(np.sin(alpha2 - run.alpha2))) < 0.05
 
 
 def test_keeps_to_the_limits_of_the_controller() -> None:

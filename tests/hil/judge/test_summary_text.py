@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import copy
 import io
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -10,6 +11,7 @@ from rich.console import Console
 from hil.judge.evidence import Evidence
 from hil.judge.summary import summarise
 from hil.judge.summary_text import print_summary, warnings_of
+from hil.scenario.files import with_overrides
 
 
 @pytest.fixture
@@ -39,6 +41,12 @@ CERTIFIED: dict[str, Any] = {
     "v1": {"median": 0.0194, "largest": 0.02, "violations": 0, "tightness": 0.2},
     "alpha1": {"median": 0.29, "largest": 0.4, "violations": 0, "tightness": 0.25},
 }
+
+
+def test_orders_that_are_refused_are_told(exact_evidence: Evidence) -> None:
+    ordered = with_overrides(exact_evidence.scenario, ["formation.change_sides_at_s=[1.0]"])
+    summary = summarise(replace(exact_evidence, scenario=ordered))
+    assert [warning for warning in warnings_of(summary) if "unsafe_side_change" in warning]
 
 
 def test_certified_radii_are_told(summary: dict[str, Any]) -> None:
