@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +67,7 @@ def command(
     failure = _lockstep(chosen, log_path) if lockstep else _live(chosen, folder, log_path, listen)
     if not log_path.exists():
         raise CheckFailedError(failure or "interrupted before anything was recorded")
-    if failure:
+    if not lockstep:
         _make_whole(log_path)
     summary = _judge(log_path, folder)
     if as_json:
@@ -102,18 +103,19 @@ def _live(scenario: Scenario, folder: Path, log_path: Path, listen: str | None) 
     from hil.live.daemon import Ending
     from hil.live.run import run_live
     from hil.live.watch import Picture
-    from hil.wire.session import free_endpoint
+    from hil.wire.session import reserved_endpoint
 
     ending = Ending()
     ending.on_signals()
     console = Console(file=sys.stderr)
-    with console.status("starting router, emulator, estimator, controller and recorder") as status:
+    starting = console.status("starting router, emulator, estimator, controller and recorder")
+    with nullcontext(listen) if listen else reserved_endpoint() as endpoint, starting as status:
 
         def show(picture: Picture, elapsed: float | None) -> None:
             if elapsed is not None:
                 status.update(picture.line(elapsed, scenario.run.duration_s))
 
-        outcome = run_live(scenario, folder, log_path, listen or free_endpoint(), ending, show)
+        outcome = run_live(scenario, folder, log_path, endpoint, ending, show)
     if outcome.interrupted:
         console.print(f"interrupted after {outcome.duration_s:.1f} s; the robots stand, the log is whole")
     return outcome.failure

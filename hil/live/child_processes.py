@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-_PATIENCE = 5.0
+_PATIENCE = 15.0
 
 
 @dataclass(slots=True)
@@ -53,6 +53,10 @@ class Children:
             start_new_session=True,
         )
         self._children[name] = Child(name, process, os.pidfd_open(process.pid), words)
+
+    def running(self, name: str) -> bool:
+        """Whether a daemon has not ended."""
+        return not self._children[name].failed
 
     def wait_for_end_of_any(self, timeout: float) -> Child | None:
         """The first daemon found to have ended, or None after ``timeout`` [s]."""

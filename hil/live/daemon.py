@@ -7,24 +7,27 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from types import FrameType
 from typing import Any, Protocol
 
 from hil.nodes.node import TICK, Event, Node, Outgoing, outgoing
 from hil.wire import topics
 from hil.wire.message_types import String
-from hil.wire.pubsub import Wire
+from hil.wire.pubsub import Inbox, Wire
 from hil.wire.session import Endpoints, close_session, open_session
 
 _LONGEST_WAIT = 0.1
 _LINGER = 0.05
+_AFTERMATH = 0.5
 
 
 class Worker(Protocol):
     """What a daemon does with what arrives."""
 
     subscribes: tuple[str, ...]
+    thorough: bool
+    """Whether, told to end, it still takes what is on its way."""
 
     def begin(self, now_ns: int) -> None:
         """Come up."""
@@ -45,6 +48,8 @@ class NodeWorker:
     With ``parting`` the nodes are told to stop before they leave, by the same stop message that all others
     get: so a controller's last command is a standstill, and the log holds the reason.
     """
+
+    thorough = False
 
     def __init__(self, nodes: Sequence[Node[Any]], parting: str = "") -> None:
         self.nodes = tuple(nodes)
@@ -152,12 +157,24 @@ def run_daemon(
             # Also while arrivals are waiting: who is flooded must not fall silent.
             if (now_ns := time.time_ns()) >= worker.due_ns():
                 _publish(wire, worker.take(TICK, now_ns))
+        for messages in aftermath(wire.inbox, worker):
+            _publish(wire, messages)
         _publish(wire, worker.end(time.time_ns()))
         time.sleep(_LINGER)
         return wire.inbox.dropped
     finally:
         wire.close()
         close_session(session)
+
+
+def aftermath(inbox: Inbox, worker: Worker) -> Iterator[tuple[Outgoing, ...]]:
+    """What a thorough worker says to arrivals until none comes for a moment.
+
+    Where others go on sending, it ends after half a second.
+    """
+    until = time.monotonic() + _AFTERMATH
+    while worker.thorough and time.monotonic() < until and (event := inbox.take(_LINGER)) is not None:
+        yield worker.take(event, time.time_ns())
 
 
 def _publish(wire: Wire, messages: tuple[Outgoing, ...]) -> None:

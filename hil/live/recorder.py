@@ -28,6 +28,8 @@ class Recorder:
     goes to the topic ``malformed``, byte for byte.
     """
 
+    thorough = True
+
     def __init__(self, scenario: Scenario, path: Path) -> None:
         self._types = topics.types_of(scenario)
         self.subscribes = tuple(topic for topic in self._types if topic != topics.MALFORMED)

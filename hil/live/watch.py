@@ -18,18 +18,20 @@ from hil.wire.topics import Topics
 
 _STILL_V = 0.01
 _STILL_U = 0.05
+_LONGEST_GLANCE = 0.25
+"""Between two looks [s]; more than this says that the machine stood still."""
 
 
 @dataclass(slots=True)
 class Picture:
     """The newest of everything, by the follower that it is of.
 
-    ``followers``: their names from the leader on. ``heard``: when each node last reported (monotonic
-    seconds), ``problems``: what it said.
+    ``followers``: their names from the leader on. ``watched_s``: for how long we have looked. ``heard``: at
+    which ``watched_s`` each node last reported, ``problems``: what it said.
     """
 
     followers: tuple[str, ...] = ()
-
+    watched_s: float = 0.0
     heard: dict[str, float] = field(default_factory=dict)
     problems: dict[str, str] = field(default_factory=dict)
     motion_since_ns: int | None = None
@@ -49,8 +51,12 @@ class Picture:
 
     def silent(self, names: Iterable[str], patience: float) -> str | None:
         """A node that has reported before but not in the last ``patience`` [s]."""
-        now = time.monotonic()
-        return next((n for n in names if n in self.heard and now - self.heard[n] > patience), None)
+        since = self.watched_s - patience
+        return next((n for n in names if n in self.heard and self.heard[n] < since), None)
+
+    def watch_on(self, seconds: float) -> None:
+        """Time has passed. Where it was long, we stood still too: the daemons may not be to blame."""
+        self.watched_s += min(seconds, _LONGEST_GLANCE)
 
     def line(self, elapsed: float, duration: float) -> str:
         """One line for the person who watches."""
@@ -83,6 +89,7 @@ class Watch:
         self.picture = Picture(tuple(pair.follower for pair in pairs))
         self._lock = threading.Lock()
         self._latest: dict[str, bytes] = {}
+        self._looked_at = time.monotonic()
         self._subscribers = [
             session.declare_subscriber(topics.DIAGNOSTICS, self._on_diagnostics),
             *(
@@ -97,7 +104,9 @@ class Watch:
         """The picture as of now. Payloads are decoded here, not in Zenoh's threads."""
         with self._lock:
             latest, self._latest = self._latest, {}
-        picture = self.picture
+        picture, looked_at = self.picture, time.monotonic()
+        picture.watch_on(looked_at - self._looked_at)
+        self._looked_at = looked_at
         for pair in self._pairs:
             # What can't be decoded is somebody else's noise; those who act on these topics count it.
             with contextlib.suppress(MalformedPayloadError, ValueError):
@@ -131,7 +140,7 @@ class Watch:
             return
         for status in report.status:
             name = status.name.removeprefix("abreast/")
-            self.picture.heard[name] = time.monotonic()
+            self.picture.heard[name] = self.picture.watched_s
             self.picture.problems[name] = status.message if status.level else ""
             for value in status.values:
                 if name == "emulator" and value.key == "motion_since_ns" and value.value.isdecimal():

@@ -18,7 +18,7 @@ from hil.sweep.work import Piece, fly_piece
 
 Done = tuple[Piece, NDArray[np.void]]
 
-_CONNECT_TIMEOUT = "10s"
+_CONNECT_TIMEOUT = "30s"
 
 
 def fly_here(sweep: Sweep, pieces: Sequence[Piece], workers: int) -> Iterator[Done]:

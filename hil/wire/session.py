@@ -7,7 +7,8 @@ import re
 import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -74,11 +75,17 @@ def close_session(session: zenoh.Session) -> None:
     closer.join(_CLOSE_S)
 
 
-def free_endpoint() -> str:
-    """A loopback endpoint on a port that is free now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+@contextmanager
+def reserved_endpoint() -> Iterator[str]:
+    """A loopback endpoint on a free port, which nobody else is given until one of us listens there.
+
+    Hold it until the router is up. A port that was merely found free may be gone a moment later.
+    """
+    with socket.socket() as held:
+        # With this option on both sides, one socket may listen where another is bound: Zenoh's has it too.
+        held.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        held.bind(("127.0.0.1", 0))
+        yield f"tcp/127.0.0.1:{held.getsockname()[1]}"
 
 
 def _config(endpoints: Endpoints) -> zenoh.Config:

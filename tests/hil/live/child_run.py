@@ -17,7 +17,7 @@ from hil.wire.messages import decode_as
 from hil.wire.pubsub import Wire
 from hil.wire.session import Endpoints, close_session, open_session
 
-PATIENCE = 150.0
+PATIENCE = 300.0
 """For what takes a few seconds on a machine that has nothing else to do [s]."""
 
 DRIVING_V = 0.03

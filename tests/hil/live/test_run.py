@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from hil.log.reader import read_log
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.messages import decode_as, encode, header, to_ns
-from hil.wire.session import free_endpoint
+from hil.wire.session import reserved_endpoint
 from tests.hil.live.child_run import PATIENCE, Run
 
 COMMAND, CMD_VEL = "follower/command", "follower/cmd_vel"
@@ -34,9 +35,10 @@ MOMENTS = 2.0
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Callable[..., Run]]:
     runs: list[Run] = []
+    ports = ExitStack()
 
     def begin(*options: str, duration: float = 4.0, scenario: str = "turtlebot3") -> Run:
-        folder, endpoint = tmp_path / f"run{len(runs)}", free_endpoint()
+        folder, endpoint = tmp_path / f"run{len(runs)}", ports.enter_context(reserved_endpoint())
         where = ["--out", str(folder), "--listen", endpoint, "--duration", str(duration)]
         process = subprocess.Popen(
             [sys.executable, "-m", "hil", "run", scenario, *where, "--json", *options],
@@ -48,13 +50,15 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Run]]:
         runs.append(Run(folder, endpoint, process))
         return runs[-1]
 
-    yield begin
+    with ports:
+        yield begin
     for run in runs:
         if run.process.poll() is None:
             run.process.kill()
             run.process.communicate()
         for pid in run.daemons().values():
-            os.kill(pid, signal.SIGKILL)
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
 
 
 def last_truth(log: Path, topic: str = topics.TRUTH) -> msg.Truth:

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -113,25 +114,39 @@ def test_two_workers_give_the_bits_of_one(make_sweep: Callable[..., Sweep], tmp_
     assert one["cells"] == two["cells"]
 
 
+PATIENCE = 150.0
+
+
+def told_address(scheduler: subprocess.Popen[bytes], file: Path) -> str:
+    """Where a scheduler listens; it writes its file in no hurry, so the file may be there half written."""
+    give_up = time.monotonic() + PATIENCE
+    while scheduler.poll() is None and time.monotonic() < give_up:
+        with suppress(OSError, ValueError):
+            return str(json.loads(file.read_text())["address"])
+        time.sleep(0.05)
+    raise AssertionError("the scheduler did not come up")
+
+
 @pytest.fixture
 def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
     """Address of a Dask scheduler on this machine, and the processes of its two workers."""
     file = tmp_path / "scheduler.json"
-    module = [sys.executable, "-m"]
-    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
-    options = ["--no-dashboard", "--scheduler-file", str(file)]
-    scheduler = subprocess.Popen(
-        [*module, "distributed.cli.dask_scheduler", *options, "--host", "127.0.0.1", "--port", "0"], **quiet
-    )
-    worker = [*module, "distributed.cli.dask_worker", "--no-nanny", "--nthreads", "1", *options]
-    workers = [subprocess.Popen(worker, **quiet) for _ in range(2)]
+    processes: list[subprocess.Popen[bytes]] = []
+
+    def start(kind: str, *options: str) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard", *options]
+        with (tmp_path / f"{kind}{len(processes)}.log").open("wb") as log:
+            processes.append(subprocess.Popen(command, stdout=log, stderr=log, cwd=tmp_path))
+        return processes[-1]
+
     try:
-        give_up = time.monotonic() + 150.0
-        while not file.exists() and time.monotonic() < give_up:
-            time.sleep(0.05)
-        yield json.loads(file.read_text())["address"], workers
+        here = ["--host", "127.0.0.1"]
+        scheduler = start("scheduler", *here, "--port", "0", "--scheduler-file", str(file))
+        address = told_address(scheduler, file)
+        alone = ["--no-nanny", "--nthreads", "1", "--memory-limit", "0", "--local-directory", str(tmp_path)]
+        yield address, [start("worker", address, *here, *alone) for _ in range(2)]
     finally:
-        for process in (*workers, scheduler):
+        for process in reversed(processes):
             process.kill()
             process.wait()
 

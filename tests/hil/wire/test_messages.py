@@ -3,7 +3,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import io
-import time
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
@@ -181,13 +180,11 @@ def test_a_count_of_elements_that_are_not_there_costs_nothing(count: int) -> Non
     payload = bytearray(encode(RigidBodies(Header(stamp=to_time(0), frame_id=""), 0, [])))
     payload[-4:] = count.to_bytes(4, "little")
     tracemalloc.start()
-    begin = time.perf_counter()
     with pytest.raises(MalformedPayloadError):
         decode(bytes(payload), RigidBodies.__msgtype__)
     _, peak_bytes = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak_bytes < 1_000_000
-    assert time.perf_counter() - begin < 0.5
 
 
 def test_three_random_bytes_are_named_as_what_they_are_not() -> None:
