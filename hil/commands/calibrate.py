@@ -1,36 +1,93 @@
-"""``abreast calibrate``: the offsets of a range and bearing sensor, from a log that mocap has watched."""
+"""``abreast calibrate``: how late a lab's robots and stamps are, and by how much its sensors are off."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from hil.errors import UsageError
 from hil.report_json import print_json
 
+if TYPE_CHECKING:
+    from estimation.sensor_bias import SensorBias
+    from hil.replay.timing import Timing
+    from hil.scenario.schema import Scenario
+
+_MEANINGS = {
+    "lag_s": "first-order lag of the robot's actuators",
+    "transport_s": "from a command to where its answer begins",
+    "delay_s": "both together, which are better known than how they share it",
+    "stamp_offset_s": "mocap stamps are this much later than the robot's clock was",
+    "transport_latency_s": "a frame is at least this old when it comes",
+}
+
 
 @click.command("calibrate")
 @click.argument("log", type=click.Path(path_type=Path))
-@click.option("--from", "from_s", type=float, metavar="S", help="Use sightings from here on.")
-@click.option("--to", "to_s", type=float, metavar="S", help="Use sightings up to here.")
-@click.option("--json", "as_json", is_flag=True, help="Print the offsets as one JSON object on stdout.")
-def command(log: Path, from_s: float | None, to_s: float | None, as_json: bool) -> None:
-    """Compare the sightings in LOG with the mocap poses beside them, and say by how much they are off.
+@click.option("--follower", metavar="NAME", help="Of a chain: the follower to look at.")
+@click.option("--from", "from_s", type=float, metavar="S", help="Use what was measured from here on.")
+@click.option("--to", "to_s", type=float, metavar="S", help="Use what was measured up to here.")
+@click.option("--json", "as_json", is_flag=True, help="Print what was found as one JSON object on stdout.")
+def command(log: Path, follower: str | None, from_s: float | None, to_s: float | None, as_json: bool) -> None:
+    """Say what LOG tells of the lab that it was made in, and the settings that put it right.
 
-    --from and --to are seconds since the first sighting, for imported recordings the source's own time.
+    Commands and odometry tell the lag and delay of the robot, odometry and mocap frames how late the stamps
+    of mocap are, sightings and mocap poses by how much a range and bearing sensor is off.
+
+    --from and --to are seconds since the first sighting or, for the timing, the first odometry; for imported
+    recordings the source's own time.
     """
     from hil.log.metadata import scenario_of
     from hil.log.reader import read_log
     from hil.replay.calibration import calibrate
+    from hil.replay.timing import timing_of
+    from hil.scenario.links import link_of, refuse_chain
+    from hil.wire.topics import topics_of
 
     if from_s is not None and to_s is not None and to_s <= from_s:
         raise UsageError(f"--to {to_s:g}: expected more than --from {from_s:g}")
     given = read_log(log)
-    scenario = scenario_of(given)
-    if scenario is None:
+    whole = scenario_of(given)
+    if whole is None:
         raise UsageError(f"log {log}: was not made by abreast; turn it into one with: abreast import")
-    found = calibrate(given, scenario, from_s, to_s)
+    if follower is None:
+        refuse_chain(whole, "name a follower of it with --follower")
+    scenario = whole if follower is None else link_of(whole, follower).scenario
+    timing = timing_of(given, scenario, from_s, to_s)
+    sighting = topics_of(scenario).sighting
+    sighted = sighting in given.topics
+    if not (timing.known or sighted):
+        raise UsageError(
+            f"log {log}: has no sightings to calibrate (no topic {sighting!r}); {'; '.join(timing.unknown)}"
+        )
+    offsets = calibrate(given, scenario, from_s, to_s) if sighted else None
+    result = _say_timing(timing, scenario)
+    if offsets is not None:
+        result |= _say_offsets(log, offsets)
+    if as_json:
+        print_json(result)
+
+
+def _say_timing(timing: Timing, scenario: Scenario) -> dict[str, object]:
+    """Print the timing, what is unknown of it, and its settings, and return it for JSON."""
+    result: dict[str, object] = {}
+    for name, known in timing.keys(scenario).items():
+        click.echo(f"{name:19} {known.value:+.4f} s give or take {known.sd:.4f}: {_MEANINGS[name]}", err=True)
+        result |= {name: known.value, f"{name}_sd": known.sd}
+    for line in timing.unknown:
+        click.echo(line, err=True)
+    settings = timing.settings(scenario)
+    if settings:
+        told = " ".join(f"--set {key}={value:.4f}" for key, value in settings.items())
+        click.echo(f"run next with: {told}", err=True)
+        result["settings"] = settings
+    return result
+
+
+def _say_offsets(log: Path, found: SensorBias) -> dict[str, object]:
+    """Print the offsets of a sensor and their settings, and return them for JSON."""
     offsets = {"range_bias": found.range, "bearing_bias": found.bearing}
     for (name, offset), unit in zip(offsets.items(), ("m", "rad"), strict=True):
         click.echo(
@@ -44,8 +101,7 @@ def command(log: Path, from_s: float | None, to_s: float | None, as_json: bool) 
         f"abreast replay {log} {settings}",
         err=True,
     )
-    if as_json:
-        result: dict[str, object] = {"samples": found.samples, "outliers": found.outliers}
-        for name, offset in offsets.items():
-            result |= {name: offset.value, f"{name}_sd": offset.sd, f"{name}_spread": offset.spread}
-        print_json(result)
+    result: dict[str, object] = {"samples": found.samples, "outliers": found.outliers}
+    for name, offset in offsets.items():
+        result |= {name: offset.value, f"{name}_sd": offset.sd, f"{name}_spread": offset.spread}
+    return result

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from estimation.clock import Arrival, heard
 from estimation.host_time import HostTime, on_host
+from hil.scenario.files import refuse_two_corrections
 from hil.scenario.schema import Scenario
 from hil.wire.intake import CLOCK_TOLERANCE_NS, Frame
 
@@ -24,12 +25,17 @@ class Timed:
 
 
 class FrameTime:
-    """How a scenario tells the time of a frame. Holds no state of its own between calls."""
+    """How a scenario tells the time of a frame. Holds no state of its own between calls.
+
+    Raises :class:`UsageError` as :func:`hil.scenario.files.refuse_two_corrections`.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
         given = scenario.estimator
+        refuse_two_corrections(scenario)
         self.trusted = given.clock == "trusted"
         self.latency_ns = round(given.transport_latency_s * 1e9)
+        self.offset_ns = round(given.stamp_offset_s * 1e9)
 
     def of(self, times: HostTime, frame: Frame, now_ns: int) -> Timed:
         """Time of a frame received at ``now_ns``, and what is known of the clock after it.
@@ -41,13 +47,14 @@ class FrameTime:
         if self.trusted:
             clock = heard(times.clock, arrival)
             jumped = clock.jumps > times.clock.jumps
-            refusal = "bad_stamp" if frame.capture_ns > now_ns + CLOCK_TOLERANCE_NS else ""
-            return Timed(HostTime(clock), frame.capture_ns, refusal, restart=jumped)
-        after, capture_ns = on_host(times, arrival, self.latency_ns)
-        if capture_ns is None:
+            capture_ns = frame.capture_ns - self.offset_ns
+            refusal = "bad_stamp" if capture_ns > now_ns + CLOCK_TOLERANCE_NS else ""
+            return Timed(HostTime(clock), capture_ns, refusal, restart=jumped)
+        after, mapped_ns = on_host(times, arrival, self.latency_ns)
+        if mapped_ns is None:
             doubted = after.clock.suspects or after.clock.jumps
             return Timed(after, 0, "clock_jump" if doubted else "clock_unknown")
-        return Timed(after, capture_ns)
+        return Timed(after, mapped_ns)
 
     def report(self, times: HostTime) -> dict[str, object]:
         """What is known of the clock, as values of a diagnostics message; the errors hold 99 times in 100."""

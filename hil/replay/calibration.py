@@ -46,13 +46,14 @@ def calibrate(
     source = topics.RIGID_BODIES if topics.RIGID_BODIES in log.topics else topics.TRUTH
     sightings: dict[int, Sighting] = {}
     poses: Poses = {}
+    late_ns = round(scenario.estimator.stamp_offset_s * 1e9)
     for event, now_ns in logged_events(log, [source, names.sighting]):
         try:
             if event.topic == names.sighting:
                 sighting = read_sighting(event.payload, now_ns)
                 sightings[sighting.capture_ns] = sighting
             else:
-                poses |= _poses(event.topic, event.payload, names, now_ns)
+                poses |= _poses(event.topic, event.payload, names, now_ns, late_ns)
         except (RefusedError, MalformedPayloadError):
             continue
     if len(poses) < 2:
@@ -76,11 +77,11 @@ def calibrate(
         raise UsageError(f"log {log.path}: {error}; give a longer span") from None
 
 
-def _poses(topic: str, payload: bytes, names: Topics, now_ns: int) -> Poses:
+def _poses(topic: str, payload: bytes, names: Topics, now_ns: int, late_ns: int) -> Poses:
     if topic == topics.RIGID_BODIES:
         frame = read_frame(payload, names.leader, names.follower, now_ns)
         own = frame.follower
-        return {frame.capture_ns: (*frame.leader, own.x, own.y, own.theta)}
+        return {frame.capture_ns - late_ns: (*frame.leader, own.x, own.y, own.theta)}
     truth = decode_as(payload, Truth)
     told = (truth.leader_x, truth.leader_y, truth.follower_x, truth.follower_y, truth.follower_theta)
     return {to_ns(truth.header.stamp): told} if all(map(math.isfinite, told)) else {}

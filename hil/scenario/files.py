@@ -48,9 +48,11 @@ def build_scenario(
 def refuse_unrunnable(scenario: Scenario) -> None:
     """Raise :class:`UsageError` if the scenario can be simulated or replayed only, not driven.
 
-    That is one with an estimator that needs to know the future, or a flock of agents.
+    That is one with an estimator that needs to know the future, or a flock of agents. Raises it too as
+    :func:`refuse_two_corrections`.
     """
     kind = scenario.estimator.kind
+    refuse_two_corrections(scenario)
     if kind in OFFLINE_ESTIMATORS:
         raise UsageError(
             f"estimator.kind is {kind!r}: it needs a whole log; run with another one, then "
@@ -63,6 +65,16 @@ def refuse_unrunnable(scenario: Scenario) -> None:
         )
     if scenario.formation.change_sides_at_s:
         refuse_chain(scenario, "formation.change_sides_at_s is for a pair: leave it out")
+
+
+def refuse_two_corrections(scenario: Scenario) -> None:
+    """Raise :class:`UsageError` if stamps that are mapped to host time anyway are to be shifted too."""
+    given = scenario.estimator
+    if given.clock == "estimated" and given.stamp_offset_s != 0.0:
+        raise UsageError(
+            f"estimator.stamp_offset_s is {given.stamp_offset_s:g}: it corrects clock 'trusted' only; with "
+            "clock 'estimated' set it to 0 and give estimator.transport_latency_s"
+        )
 
 
 def merged_scenario(part: Mapping[str, Any], name: str, source: str) -> Scenario:

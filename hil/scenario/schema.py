@@ -207,6 +207,7 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``turn_bandwidth``: q_u = turn_bandwidth * k_u^2 per second (0.5 agile, 0.03 gentle leaders).
     ``clock``: trusted takes the stamps of mocap frames for host time; estimated maps them to it by what is
     seen of their delays, of which ``transport_latency_s`` is known to be the way.
+    ``stamp_offset_s``: by how much trusted stamps are later than the robot's clock was at the capture.
     ``speed_bandwidth``: q_v = speed_bandwidth * k_v^2 per second (0.01 for leaders that drive evenly, 0.1
     for those that stop and go every few seconds).
     ``align_odometry``: odometry is corrected by the delay and scales that the follower's mocap track shows.
@@ -219,6 +220,7 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     own_motion: OwnMotion = "odometry"
     clock: ClockName = "trusted"
     transport_latency_s: NonNegative = 0.0
+    stamp_offset_s: float = 0.0
     align_odometry: bool = False
     sigma_position: Positive = 0.0003
     sigma_heading: Positive = 0.0035

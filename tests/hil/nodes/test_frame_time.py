@@ -9,6 +9,7 @@ import pytest
 from estimation.tracking import Status
 from formation.pose import Motion, Pose, advance
 from hil.emulator.lab_messages import frame_message, odometry_message
+from hil.errors import UsageError
 from hil.judge.evidence import evidence_of_log
 from hil.judge.summary import summarise
 from hil.log.reader import Log, read_log
@@ -131,3 +132,19 @@ def test_a_run_with_a_clock_of_its_own_is_replayed_bit_for_bit(off_log: Log) -> 
     played = replay(off_log)
     assert played.parity["estimates"].compared > 700
     assert played.mismatched == 0
+
+
+def test_trusted_stamps_are_put_right_by_their_offset_before_they_are_judged() -> None:
+    node = node_with("estimator.stamp_offset_s=0.1")
+    state, found = lived(node, 60, 100_000_000, 60, 0)
+    assert state.refused == {}
+    assert all(to_ns(estimate.header.stamp) == at_ns for at_ns, estimate in found)
+    early = node_with("estimator.stamp_offset_s=-0.1")
+    state, found = lived(early, 60, 0, 60, 0)
+    assert found == []
+    assert state.refused["bad_stamp"] == 60
+
+
+def test_stamps_are_not_corrected_twice() -> None:
+    with pytest.raises(UsageError, match=r"estimator.stamp_offset_s is 0.1: .*give estimator.transport_l"):
+        node_with("estimator.stamp_offset_s=0.1", "estimator.clock=estimated")
