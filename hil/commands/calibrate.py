@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from hil.commands.seconds import Seconds
 from hil.errors import UsageError
 from hil.report_json import print_json
 
@@ -27,8 +28,8 @@ _MEANINGS = {
 @click.command("calibrate")
 @click.argument("log", type=click.Path(path_type=Path))
 @click.option("--follower", metavar="NAME", help="Of a chain: the follower to look at.")
-@click.option("--from", "from_s", type=float, metavar="S", help="Use what was measured from here on.")
-@click.option("--to", "to_s", type=float, metavar="S", help="Use what was measured up to here.")
+@click.option("--from", "from_s", type=Seconds(), metavar="S", help="Use what was measured from here on.")
+@click.option("--to", "to_s", type=Seconds(), metavar="S", help="Use what was measured up to here.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was found as one JSON object on stdout.")
 def command(log: Path, follower: str | None, from_s: float | None, to_s: float | None, as_json: bool) -> None:
     """Say what LOG tells of the lab that it was made in, and the settings that put it right.

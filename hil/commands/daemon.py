@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from hil.commands.seconds import DURATION
 from hil.errors import UsageError
 from hil.live.daemon import Ending, NodeWorker, Worker, run_daemon
 from hil.scenario.certify import CERTIFY
@@ -80,13 +81,12 @@ def daemon_command(name: str, summary: str) -> click.Command:
             click.echo(f"abreast {name}: {dropped} messages came too fast and were dropped", err=True)
 
     path = click.Path(path_type=Path, dir_okay=False)
-    positive = click.FloatRange(min=0, min_open=True)
     options: list[click.Parameter] = [
         click.Argument(["scenario"]),
         click.Option(["--connect"], metavar="ENDPOINT", help=f"Router to connect to [{DEFAULT_ENDPOINT}]."),
         click.Option(["--listen"], metavar="ENDPOINT", help="Be the router, at this endpoint."),
         click.Option(["--zenoh-config"], type=path, help="Zenoh config file, in place of both."),
-        click.Option(["--duration"], type=positive, help="End after S seconds."),
+        click.Option(["--duration"], type=DURATION, help="End after S seconds."),
         click.Option(["--set", "overrides"], multiple=True, metavar="KEY=VALUE", help="Override a key."),
         click.Option(["--tethered"], is_flag=True, hidden=True),
     ]

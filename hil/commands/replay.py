@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
 from hil.judged_log import leave, made_folder
 from hil.report_json import print_json
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
 @click.option("--follower", metavar="NAME", help="Name of the follower's body.")
 @click.option("--map", "chart", metavar="FILE", help="Names the topics of a log that is not abreast's.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key.")
-@click.option("--from", "from_s", type=float, metavar="S", help="Judge from here on.")
-@click.option("--to", "to_s", type=float, metavar="S", help="Judge up to here.")
+@click.option("--from", "from_s", type=Seconds(), metavar="S", help="Judge from here on.")
+@click.option("--to", "to_s", type=Seconds(), metavar="S", help="Judge up to here.")
 @click.option("--csv", "table", type=click.Path(path_type=Path), metavar="FILE", help="Write the estimates.")
 @click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Folder for results."

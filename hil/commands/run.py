@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from hil.commands.seconds import DURATION
 from hil.errors import CheckFailedError, UsageError
 from hil.judged_log import judge_log, made_folder
 from hil.report_json import print_json
@@ -17,8 +18,6 @@ from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario, refuse_unrunnable
 from hil.scenario.links import chain_of, links_of
 from hil.scenario.schema import Scenario
-
-DURATION = click.FloatRange(min=0, min_open=True)
 
 
 @click.command("run")
@@ -99,6 +98,7 @@ def _lockstep(scenario: Scenario, log_path: Path) -> str:
 
 def _live(scenario: Scenario, folder: Path, log_path: Path, listen: str | None) -> str:
     from rich.console import Console
+    from rich.text import Text
 
     from hil.live.daemon import Ending
     from hil.live.run import run_live
@@ -113,9 +113,13 @@ def _live(scenario: Scenario, folder: Path, log_path: Path, listen: str | None) 
 
         def show(picture: Picture, elapsed: float | None) -> None:
             if elapsed is not None:
-                status.update(picture.line(elapsed, scenario.run.duration_s))
+                # What is on the wire may look like markup.
+                status.update(Text(picture.line(elapsed, scenario.run.duration_s)))
 
-        outcome = run_live(scenario, folder, log_path, endpoint, ending, show)
+        try:
+            outcome = run_live(scenario, folder, log_path, endpoint, ending, show)
+        finally:
+            ending.leave_signals()
     if outcome.interrupted:
         console.print(f"interrupted after {outcome.duration_s:.1f} s; the robots stand, the log is whole")
     return outcome.failure

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 import msgspec
 
+from hil.commands.seconds import DURATION
 from hil.errors import UsageError
 from hil.report_json import print_json
 from hil.scenario.files import load_scenario
@@ -16,7 +17,7 @@ from hil.scenario.schema import Scenario
 @click.command("simulate")
 @click.argument("scenario", default="turtlebot3")
 @click.option("--law", help="Law in place of the scenario's.")
-@click.option("--duration", type=click.FloatRange(min=0, min_open=True), help="Seconds to simulate.")
+@click.option("--duration", type=DURATION, help="Seconds to simulate.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for pictures and CSV.")
 @click.option("--stability", is_flag=True, help="Check the propositions of the paper, too; a pair only.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key.")

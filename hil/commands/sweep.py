@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from hil.commands.seconds import Seconds
 from hil.errors import UsageError
 from hil.report_json import print_json
 from hil.sweep.spec import Sweep, load_sweep
@@ -19,7 +20,7 @@ from hil.sweep.spec import Sweep, load_sweep
 @click.argument("spec", default="default")
 @click.option("--runs", type=click.IntRange(min=1), metavar="N", help="Runs of every cell.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all noise.")
-@click.option("--duration", type=click.FloatRange(min=1.0), metavar="S", help="Seconds of every run.")
+@click.option("--duration", type=Seconds(1.0), metavar="S", help="Seconds of every run.")
 @click.option("--estimators", metavar="A,B", help="Estimators, of ekf, ukf and difference.")
 @click.option(
     "--workers", type=click.IntRange(min=1), metavar="N", help="Processes [as many as there are processors]."

@@ -184,7 +184,7 @@ def evidence_of_link(log: Log, link: Link) -> Evidence:
         arrivals=arrivals,
         orders=() if link.in_chain else orders_of(scenario, _timed(log, records[names.side], String)),
         certified=_decoded(log, records[names.certified], CertifiedEstimate),
-        log=LogFacts(str(log.path), log.messages, log.path.stat().st_size),
+        log=LogFacts(str(log.path).encode(errors="replace").decode(), log.messages, log.path.stat().st_size),
         certificate=None if link.first else certificate_json(certificate_of(scenario, driven=False)),
     )
     return replace(evidence, zero_ns=_zero_ns(log, evidence))

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from formation.pose import STANDSTILL
+from hil.errors import UsageError
 from hil.live.child_processes import Children
 from hil.live.daemon import Ending
 from hil.live.watch import Picture, Watch
@@ -58,8 +59,15 @@ def run_live(
     ``show`` gets the picture of the run and the time since the leader set off (None before), some 20 times a
     second. However it ends, the robots are stopped, the log is finished and no process is left.
     """
+    resolved = folder / "scenario.toml"
+    try:
+        resolved.write_text(scenario_text(scenario), encoding="utf-8")
+    except OSError as error:
+        raise UsageError(
+            f"--out {folder}: cannot be written ({error.strerror}); give another folder"
+        ) from None
     router = open_session(Endpoints(listen=endpoint))
-    supervisor = _Supervisor(scenario, folder, log_path, endpoint)
+    supervisor = _Supervisor(scenario, resolved, folder, log_path, endpoint)
     try:
         return supervisor.run(ending, show)
     finally:
@@ -81,7 +89,9 @@ def processes_of(links: Sequence[Link]) -> Iterator[tuple[str, str, tuple[str, .
 
 
 class _Supervisor:
-    def __init__(self, scenario: Scenario, folder: Path, log_path: Path, endpoint: str) -> None:
+    def __init__(
+        self, scenario: Scenario, resolved: Path, folder: Path, log_path: Path, endpoint: str
+    ) -> None:
         self._scenario = scenario
         links = links_of(scenario)
         self._pairs = [link_topics(link) for link in links]
@@ -90,8 +100,6 @@ class _Supervisor:
         self._wire = Wire(self._session, urgent_topics(scenario))
         self._watch = Watch(self._session, self._pairs)
         self._children = Children(folder)
-        resolved = folder / "scenario.toml"
-        resolved.write_text(scenario_text(scenario), encoding="utf-8")
         extra = {
             "recorder": ["--out", str(log_path)],
             "emulator": ["--needs", "estimator,controller,recorder"],

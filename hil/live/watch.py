@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import zenoh
 
@@ -15,6 +16,8 @@ from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.messages import MalformedPayloadError, decode_as, to_ns
 from hil.wire.topics import Topics
+
+M = TypeVar("M", bound=msg.Message)
 
 _STILL_V = 0.01
 _STILL_U = 0.05
@@ -108,18 +111,17 @@ class Watch:
         picture.watch_on(looked_at - self._looked_at)
         self._looked_at = looked_at
         for pair in self._pairs:
-            # What can't be decoded is somebody else's noise; those who act on these topics count it.
-            with contextlib.suppress(MalformedPayloadError, ValueError):
-                if pair.estimate in latest:
-                    picture.estimates[pair.follower] = decode_as(latest[pair.estimate], msg.LeaderEstimate)
-                if pair.certified in latest:
-                    picture.certified[pair.follower] = decode_as(
-                        latest[pair.certified], msg.CertifiedEstimate
-                    )
-                if pair.command in latest:
-                    picture.commands[pair.follower] = decode_as(latest[pair.command], msg.Command)
-                if pair.truth in latest:
-                    picture.truths[pair.follower] = decode_as(latest[pair.truth], msg.Truth)
+            who = pair.follower
+            if seen := _sound(latest, pair.estimate, msg.LeaderEstimate):
+                # A status that does not exist can't be shown either.
+                with contextlib.suppress(ValueError):
+                    picture.estimates[who] = replace(seen, status=Status(seen.status))
+            if sure := _sound(latest, pair.certified, msg.CertifiedEstimate):
+                picture.certified[who] = sure
+            if sent := _sound(latest, pair.command, msg.Command):
+                picture.commands[who] = sent
+            if true := _sound(latest, pair.truth, msg.Truth):
+                picture.truths[who] = true
         return picture
 
     def close(self) -> None:
@@ -145,3 +147,12 @@ class Watch:
             for value in status.values:
                 if name == "emulator" and value.key == "motion_since_ns" and value.value.isdecimal():
                     self.picture.motion_since_ns = min(int(value.value), stamp_ns)
+
+
+def _sound(latest: Mapping[str, bytes], topic: str, kind: type[M]) -> M | None:
+    """The newest message of a topic; what can't be decoded is for those to count who act on it."""
+    if topic not in latest:
+        return None
+    with contextlib.suppress(MalformedPayloadError):
+        return decode_as(latest[topic], kind)
+    return None

@@ -31,7 +31,8 @@ def load_scenario(name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
     """
     path = locate("scenario", _FOLDER, name_or_path)
     tree = read_toml(path, "scenario")
-    tree.setdefault("name", path.stem)
+    # A file's name may be none that UTF-8 can write.
+    tree.setdefault("name", path.stem.encode(errors="replace").decode())
     return build_scenario(tree, overrides, source=f"scenario {path.stem}")
 
 

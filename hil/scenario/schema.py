@@ -14,6 +14,7 @@ from msgspec import UNSET, Meta, Struct, UnsetType
 Positive = Annotated[float, Meta(gt=0.0)]
 Rate = Annotated[float, Meta(ge=0.01, le=10_000.0)]
 NonNegative = Annotated[float, Meta(ge=0.0)]
+Span = Annotated[float, Meta(ge=0.0, le=1e5)]
 Probability = Annotated[float, Meta(ge=0.0, lt=1.0)]
 Name = Annotated[str, Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 PoseTriple = tuple[float, float, float]
@@ -73,7 +74,7 @@ class ControllerSection(_Section, frozen=True, kw_only=True):
     u_max: Positive = 2.84
     max_age_s: Positive = 0.2
     lag_s: NonNegative = 0.1
-    transport_s: NonNegative = 0.0
+    transport_s: Span = 0.0
     tick_hz: Rate = 50.0
     v_resolution: NonNegative = 0.0
     u_resolution: NonNegative = 0.0
@@ -149,7 +150,7 @@ class RobotSection(_Section, frozen=True, kw_only=True):
     odometry_rate_hz: Rate = 30.0
     odometry_sigma_v: NonNegative = 0.002
     odometry_sigma_u: NonNegative = 0.01
-    odometry_delay_s: NonNegative = 0.0
+    odometry_delay_s: Span = 0.0
     odometry_scale_v: Positive = 1.0
     odometry_scale_u: Positive = 1.0
 
@@ -181,12 +182,12 @@ class MocapSection(_Section, frozen=True, kw_only=True):
     sigma_position: NonNegative = 0.0003
     sigma_heading: NonNegative = 0.0035
     static_fraction: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.05
-    latency_s: NonNegative = 0.03
-    jitter_s: NonNegative = 0.0
+    latency_s: Span = 0.03
+    jitter_s: Span = 0.0
     loss: Probability = 0.0
-    clock_offset_s: float = 0.0
+    clock_offset_s: Annotated[float, Meta(ge=-1.7e9, le=1e8)] = 0.0
     clock_drift_ppm: Annotated[float, Meta(ge=-500.0, le=500.0)] = 0.0
-    clock_jump_s: float = 0.0
+    clock_jump_s: Annotated[float, Meta(ge=-1e7, le=1e7)] = 0.0
     clock_jump_at_s: NonNegative = 0.0
     faults: tuple[FaultSection, ...] = ()
 
@@ -219,8 +220,8 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     front_end: FrontEnd = "world"
     own_motion: OwnMotion = "odometry"
     clock: ClockName = "trusted"
-    transport_latency_s: NonNegative = 0.0
-    stamp_offset_s: float = 0.0
+    transport_latency_s: Span = 0.0
+    stamp_offset_s: Annotated[float, Meta(ge=-1e5, le=1e5)] = 0.0
     align_odometry: bool = False
     sigma_position: Positive = 0.0003
     sigma_heading: Positive = 0.0035

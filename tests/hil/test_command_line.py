@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +11,11 @@ from pathlib import Path
 import pytest
 
 from hil.command_line import COMMANDS, main
+from hil.errors import UsageError
+from hil.judge.evidence import evidence_of_log
+from hil.log.reader import Log, read_log
 from hil.nodes.lockstep_run import run_lockstep
+from hil.scenario.checked_toml import data_folder
 from hil.scenario.files import load_scenario
 
 
@@ -78,3 +83,55 @@ def test_a_lockstep_run_prints_one_json_object_and_leaves_its_files(
         main([*arguments, str(tmp_path / "a")])
     assert refused.value.code == 2
     assert "run.mcap exists already" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", ["--from", "--to"])
+@pytest.mark.parametrize("given", ["nan", "inf", "-inf", "1e300"])
+def test_a_time_that_no_clock_tells_is_refused(
+    option: str, given: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for command in ("replay", "calibrate"):
+        with pytest.raises(SystemExit) as ended:
+            main([command, "no_such.mcap", option, given])
+        assert ended.value.code == 2
+        assert option in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "override",
+    [
+        "mocap.latency_s=1e300",
+        "mocap.clock_offset_s=1e12",
+        "mocap.clock_offset_s=-1e10",
+        "controller.transport_s=1e20",
+        "estimator.transport_latency_s=1e12",
+        "robot.odometry_delay_s=1e12",
+    ],
+)
+def test_a_time_that_no_stamp_holds_is_a_mistake(override: str) -> None:
+    with pytest.raises(UsageError, match=override.partition("=")[0]):
+        load_scenario("turtlebot3", [override])
+
+
+def test_a_name_that_is_no_text_is_written_as_far_as_it_is(tmp_path: Path, short_log: Log) -> None:
+    mine = tmp_path / os.fsdecode(b"lab\xff.toml")
+    mine.write_bytes((data_folder() / "scenarios" / "turtlebot3.toml").read_bytes())
+    assert load_scenario(str(mine)).name == "lab?"
+    log = tmp_path / os.fsdecode(b"run\xff.mcap")
+    log.write_bytes(short_log.path.read_bytes())
+    facts = evidence_of_log(read_log(log)).log
+    assert facts is not None
+    assert facts.path == f"{tmp_path}/run?.mcap"
+
+
+def test_a_full_disk_is_told_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "summary.json").symlink_to("/dev/full")
+    assert main_code(["run", "--lockstep", "--duration", "0.3", "--out", str(tmp_path)]) == 1
+    assert "No space left" in capsys.readouterr().err.splitlines()[-1]
+    assert read_log(tmp_path / "run.mcap").messages > 100
+
+
+def main_code(arguments: list[str]) -> object:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    return ended.value.code

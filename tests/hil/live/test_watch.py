@@ -1,8 +1,57 @@
+"""What a supervisor makes of what is on the wire."""
+
 from __future__ import annotations
 
-from hil.live.watch import Picture
+import math
+import time
+
+import numpy as np
+
+from hil.live.watch import Picture, Watch
+from hil.wire import message_types as msg
+from hil.wire.messages import encode, header, to_time
+from hil.wire.session import Endpoints, close_session, free_endpoint, open_session
+from hil.wire.topics import Topics
 
 PATIENCE = 3.0
+PAIR = Topics("leader", "follower", stamped=True)
+
+
+def estimate(status: int) -> msg.LeaderEstimate:
+    seen = (0.5, 1.5, 0.0, 0.0, 0.1, -1.5, 0.3, 0.1, 0.3)
+    bounds = (0.1, 0.2, 0.3)
+    none: list[msg.Consumed] = []
+    return msg.LeaderEstimate(
+        header(1, ""), to_time(1), to_time(1), *seen, np.zeros(25), 1.0, status, "", *bounds, none
+    )
+
+
+def command(stop: str) -> msg.Command:
+    return msg.Command(
+        header(1, ""), to_time(1), to_time(1), 0.0, 0.0, math.nan, math.nan, False, stop, False, []
+    )
+
+
+def test_an_estimate_that_cannot_be_is_not_shown_and_hides_nothing_else() -> None:
+    session = open_session(Endpoints(listen=free_endpoint()))
+    watch = Watch(session, [PAIR])
+    try:
+        session.put(PAIR.estimate, encode(estimate(status=1)))
+        session.put(PAIR.certified, b"rubbish")
+        session.put(PAIR.command, encode(command(stop="first")))
+        deadline = time.monotonic() + 60.0
+        while not watch.look().commands and time.monotonic() < deadline:
+            time.sleep(0.005)
+        session.put(PAIR.estimate, encode(estimate(status=200)))
+        session.put(PAIR.command, encode(command(stop="[/second]")))
+        while watch.look().commands["follower"].stop == "first" and time.monotonic() < deadline:
+            time.sleep(0.005)
+        line = watch.picture.line(1.0, 2.0)
+    finally:
+        watch.close()
+        close_session(session)
+    assert "tracking" in line
+    assert "[/second]" in line
 
 
 def watched(picture: Picture, looks: int, seconds: float) -> str | None:
