@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import os
 import signal
@@ -56,9 +57,11 @@ class NodeWorker:
         self.subscribes = tuple(dict.fromkeys(topic for node in nodes for topic in node.subscribes))
         self._parting = parting
         self._states: list[Any] = []
+        self._now_ns = 0
 
     def begin(self, now_ns: int) -> None:
         """Let the nodes come up."""
+        self._now_ns = now_ns
         self._states = [node.begin(now_ns) for node in self.nodes]
 
     def due_ns(self) -> int:
@@ -66,10 +69,14 @@ class NodeWorker:
         return min(self._dues())
 
     def take(self, event: Event, now_ns: int) -> tuple[Outgoing, ...]:
-        """One step of every node that listens to an arrival or, at a tick, is due."""
+        """One step of every node that listens to an arrival or, at a tick, is due.
+
+        At a tick after the clock was set back all are: nobody may wait until it is there again.
+        """
         out: list[Outgoing] = []
+        set_back, self._now_ns = now_ns < self._now_ns, now_ns
         for place, (node, due_ns) in enumerate(zip(self.nodes, self._dues(), strict=True)):
-            if event.topic in node.subscribes if event.topic else due_ns <= now_ns:
+            if event.topic in node.subscribes if event.topic else due_ns <= now_ns or set_back:
                 self._states[place], sent = node.step(self._states[place], event, now_ns)
                 out.extend(sent)
         return tuple(out)
@@ -93,6 +100,7 @@ class Ending:
     def __init__(self) -> None:
         self.asked = False
         self._wakers: list[Callable[[], None]] = []
+        self._before: dict[signal.Signals, Any] = {}
 
     def ask(self) -> None:
         """Ask for the end."""
@@ -105,13 +113,21 @@ class Ending:
         self._wakers.append(wake)
 
     def on_signals(self) -> None:
-        """Let SIGINT and SIGTERM ask for the end."""
+        """Let SIGINT, SIGTERM and SIGHUP (the terminal or the connection is gone) ask for the end."""
 
         def handle(_number: int, _frame: FrameType | None) -> None:
             self.ask()
 
-        signal.signal(signal.SIGINT, handle)
-        signal.signal(signal.SIGTERM, handle)
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            # Who was started with nohup is to outlive its terminal.
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+                self._before[number] = signal.signal(number, handle)
+
+    def leave_signals(self) -> None:
+        """Let signals do again what they did before."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        self._before.clear()
 
     def on_parent_gone(self) -> None:
         """Let the closing of standard input ask for the end: the parent holds its other side."""
@@ -148,19 +164,14 @@ def run_daemon(
         # What is loaded by now stays for good; walking it again would halt a live step for 100 ms and more.
         gc.freeze()
         on_ready()
-        until = None if duration_s is None else time.monotonic() + duration_s
-        while not ending.asked and (until is None or time.monotonic() < until):
-            wait = min((worker.due_ns() - time.time_ns()) * 1e-9, _LONGEST_WAIT)
-            event = wire.inbox.take(wait)
-            if event is not None:
-                _publish(wire, worker.take(event, time.time_ns()))
-            # Also while arrivals are waiting: who is flooded must not fall silent.
-            if (now_ns := time.time_ns()) >= worker.due_ns():
-                _publish(wire, worker.take(TICK, now_ns))
-        for messages in aftermath(wire.inbox, worker):
-            _publish(wire, messages)
-        _publish(wire, worker.end(time.time_ns()))
-        time.sleep(_LINGER)
+        try:
+            _work(worker, wire, ending, duration_s)
+        except Exception:
+            # A controller that breaks down says stop all the same. The first error is the one to tell.
+            with contextlib.suppress(Exception):
+                _part(worker, wire)
+            raise
+        _part(worker, wire)
         return wire.inbox.dropped
     finally:
         wire.close()
@@ -175,6 +186,30 @@ def aftermath(inbox: Inbox, worker: Worker) -> Iterator[tuple[Outgoing, ...]]:
     until = time.monotonic() + _AFTERMATH
     while worker.thorough and time.monotonic() < until and (event := inbox.take(_LINGER)) is not None:
         yield worker.take(event, time.time_ns())
+
+
+def _work(worker: Worker, wire: Wire, ending: Ending, duration_s: float | None) -> None:
+    until = None if duration_s is None else time.monotonic() + duration_s
+    taken_ns = 0
+    while not ending.asked and (until is None or time.monotonic() < until):
+        wait = min((worker.due_ns() - time.time_ns()) * 1e-9, _LONGEST_WAIT)
+        event = wire.inbox.take(wait)
+        now_ns = time.time_ns()
+        if now_ns < taken_ns:
+            # The clock was set back: what was due soon is now far away.
+            _publish(wire, worker.take(TICK, now_ns))
+        if event is not None:
+            _publish(wire, worker.take(event, now_ns))
+        # Also while arrivals are waiting: who is flooded must not fall silent.
+        if (taken_ns := time.time_ns()) >= worker.due_ns():
+            _publish(wire, worker.take(TICK, taken_ns))
+    for messages in aftermath(wire.inbox, worker):
+        _publish(wire, messages)
+
+
+def _part(worker: Worker, wire: Wire) -> None:
+    _publish(wire, worker.end(time.time_ns()))
+    time.sleep(_LINGER)
 
 
 def _publish(wire: Wire, messages: tuple[Outgoing, ...]) -> None:

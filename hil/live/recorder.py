@@ -9,7 +9,16 @@ import numpy as np
 from hil.live.certificate_process import CertificateProcess
 from hil.log.metadata import log_metadata
 from hil.log.writer import LogWriter
-from hil.nodes.node import Event, Outgoing, counted, diagnostics, named_counts, no_counts, outgoing
+from hil.nodes.node import (
+    Event,
+    Outgoing,
+    counted,
+    diagnostics,
+    is_due,
+    named_counts,
+    no_counts,
+    outgoing,
+)
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.message_types import Malformed
@@ -37,6 +46,7 @@ class Recorder:
         self._counts = no_counts()
         self._next_flush_ns = 0
         self._next_report_ns = 0
+        self._logged_ns = 0
         self._certifying = CertificateProcess(scenario)
 
     def begin(self, now_ns: int) -> None:
@@ -51,11 +61,11 @@ class Recorder:
         """Write an arrival, or flush."""
         if event.topic:
             self._write(event, now_ns)
-        if now_ns < self._next_flush_ns:
+        if not is_due(self._next_flush_ns, _FLUSH_NS, now_ns):
             return ()
         self._log.flush()
         self._next_flush_ns = now_ns + _FLUSH_NS
-        if now_ns < self._next_report_ns:
+        if not is_due(self._next_report_ns, _DIAGNOSTICS_NS, now_ns):
             return ()
         self._next_report_ns = now_ns + _DIAGNOSTICS_NS
         self._log.add_metadata(self._certifying.result())
@@ -64,7 +74,7 @@ class Recorder:
     def end(self, now_ns: int) -> tuple[Outgoing, ...]:
         """Write the recorder's own last report and finish the file."""
         report = self._report(now_ns)
-        self._log.write(report.topic, report.typename, report.payload, now_ns, now_ns)
+        self._write(Event(report.topic, report.payload), now_ns)
         self._log.flush()
         self._log.add_metadata(self._certifying.result(_LAST_CHANCE))
         self.close()
@@ -83,7 +93,9 @@ class Recorder:
             self._counts = counted(self._counts, topic)
             kept = Malformed(header(now_ns, ""), topic, np.frombuffer(payload, dtype=np.uint8))
             topic, typename, payload = topics.MALFORMED, typename_of(Malformed), encode(kept)
-        self._log.write(topic, typename, payload, now_ns, now_ns)
+        # In order even if the clock is set back, so that a replay finds it in order.
+        self._logged_ns = max(now_ns, self._logged_ns + 1)
+        self._log.write(topic, typename, payload, self._logged_ns, now_ns)
 
     def _report(self, now_ns: int) -> Outgoing:
         values = {"messages": self._log.messages, **named_counts("malformed", self._counts)}

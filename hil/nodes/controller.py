@@ -25,6 +25,7 @@ from hil.nodes.node import (
     consumed,
     counted,
     diagnostics,
+    is_due,
     named_counts,
     no_counts,
     outgoing,
@@ -214,8 +215,11 @@ class ControllerNode:
     ) -> tuple[SentCommand, ...]:
         """Commands that a prediction may still need: the one that acts at its begin, and later ones.
 
-        None begins before the capture of the estimate, or more than the largest age ago.
+        None begins before the capture of the estimate, or more than the largest age ago. Those that seem to
+        act after the newest are of a clock that was set back since.
         """
+        if len(sent) > 1 and sent[-2].from_ns > sent[-1].from_ns:
+            sent = sent[-1:]
         if estimate is None:
             return sent[-1:]
         begin_ns = max(estimate.capture_ns, now_ns - round(self.max_age / _NS))
@@ -256,7 +260,7 @@ class ControllerNode:
     def _speak(
         self, state: ControllerState, out: tuple[Outgoing, ...], now_ns: int
     ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
-        if now_ns < state.next_diagnostics_ns:
+        if not is_due(state.next_diagnostics_ns, _DIAGNOSTICS_NS, now_ns):
             return state, out
         state = replace(state, next_diagnostics_ns=now_ns + _DIAGNOSTICS_NS)
         return state, (*out, self.report(state, now_ns))

@@ -37,6 +37,7 @@ from hil.nodes.node import (
     consumed,
     counted,
     diagnostics,
+    is_due,
     named_counts,
     no_counts,
     outgoing,
@@ -48,7 +49,7 @@ from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.certified_message import certified_message
 from hil.wire.estimate_message import AssumedErrors, to_message
-from hil.wire.intake import RefusedError, read_frame, read_odometry, read_sighting
+from hil.wire.intake import CLOCK_TOLERANCE_NS, RefusedError, read_frame, read_odometry, read_sighting
 from hil.wire.message_types import Consumed
 from hil.wire.topics import topics_of
 
@@ -66,7 +67,7 @@ class EstimatorState(Struct, frozen=True):
     ``track``: of the leader. ``own``: what was heard of the follower's motion. ``times``: what is known of
     the clock that frames are stamped by. ``believed``: what certificates rest on, if any are asked for.
     ``receipts``: inputs since the last estimate. ``refused``: inputs that were not used, by cause. ``taken``:
-    inputs that were used, by kind.
+    inputs that were used, by kind. ``heard_ns``: when the newest input came.
     """
 
     track: Track = ()
@@ -79,6 +80,7 @@ class EstimatorState(Struct, frozen=True):
     next_tick_ns: int = 0
     next_diagnostics_ns: int = 0
     last_out_ns: int = 0
+    heard_ns: int = 0
 
 
 class EstimatorNode:
@@ -125,8 +127,11 @@ class EstimatorNode:
         handler = self._handlers.get(event.topic)
         if handler is None:
             return state, ()
+        if now_ns < state.heard_ns - CLOCK_TOLERANCE_NS:
+            # The clock was set back: all that comes would be too late for what was heard before.
+            state = replace(state, track=(), own=OwnMotion(), believed=Believed())
         receipts = (*state.receipts, consumed(event, now_ns))[-_MOST_RECEIPTS:]
-        state = replace(state, receipts=receipts)
+        state = replace(state, receipts=receipts, heard_ns=now_ns)
         before = state.track
         try:
             state = handler(state, event.payload, now_ns)
@@ -228,7 +233,7 @@ class EstimatorNode:
         status = self.tracker.status(state.track, now_ns)
         if status in (Status.COASTING, Status.LOST) and (now_ns - state.last_out_ns) * 2 > _TICK_NS:
             state, out = self._publish(state, now_ns)
-        if now_ns >= state.next_diagnostics_ns:
+        if is_due(state.next_diagnostics_ns, _DIAGNOSTICS_NS, now_ns):
             out = (*out, self.report(state, now_ns))
             state = replace(state, next_diagnostics_ns=now_ns + _DIAGNOSTICS_NS)
         return replace(state, next_tick_ns=now_ns + _TICK_NS), out

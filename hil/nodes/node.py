@@ -69,6 +69,11 @@ def digest(topic: str, payload: bytes) -> int:
     return int.from_bytes(hashlib.blake2b(name + b"\0" + payload, digest_size=8).digest(), "little")
 
 
+def is_due(due_ns: int, period_ns: int, now_ns: int) -> bool:
+    """Whether what is to happen every period is due; also if it is so far off that the clock was set back."""
+    return not now_ns < due_ns <= now_ns + period_ns
+
+
 def consumed(event: Event, now_ns: int) -> Consumed:
     """Receipt for an event that a node took in at ``now_ns``."""
     return Consumed(digest(event.topic, event.payload), to_time(now_ns))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -9,18 +10,19 @@ from pathlib import Path
 
 import pytest
 
-from hil.live.daemon import NodeWorker, aftermath
+from hil.live.daemon import Ending, NodeWorker, aftermath, run_daemon
 from hil.log.events import recorded_commands, recorded_estimates
 from hil.log.metadata import scenario_of
 from hil.log.reader import Log, read_log
 from hil.nodes.lockstep_run import make_nodes
-from hil.nodes.node import TICK, Event, Outgoing, digest
+from hil.nodes.node import TICK, Event, Outgoing, digest, outgoing
 from hil.replay.rerun import replay
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
 from hil.wire import topics
-from hil.wire.pubsub import Inbox
-from hil.wire.session import reserved_endpoint
+from hil.wire.message_types import String
+from hil.wire.pubsub import Inbox, Wire
+from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
 from hil.wire.topics import topics_of
 from tests.hil.live.child_run import PATIENCE
 
@@ -89,6 +91,66 @@ def lost_something(log: Log, scenario: Scenario) -> bool:
         if not taken.issuperset(arrived[:last]):
             return True
     return False
+
+
+class Breaking:
+    """A worker whose first step breaks down."""
+
+    subscribes: tuple[str, ...] = ()
+    thorough = False
+
+    def begin(self, now_ns: int) -> None:
+        pass
+
+    def due_ns(self) -> int:
+        return 0
+
+    def take(self, event: Event, now_ns: int) -> tuple[Outgoing, ...]:
+        raise ZeroDivisionError("in a step")
+
+    def end(self, now_ns: int) -> tuple[Outgoing, ...]:
+        return (outgoing(topics.STOP, String(data="the controller ended"), now_ns),)
+
+
+def test_who_breaks_down_says_stop_before_it_ends() -> None:
+    with reserved_endpoint() as endpoint:
+        router = open_session(Endpoints(listen=endpoint))
+        ear = Wire(router)
+        ear.subscribe([topics.STOP])
+        try:
+            with pytest.raises(ZeroDivisionError):
+                run_daemon(Breaking, [topics.STOP], Endpoints(connect=endpoint), Ending())
+            heard = ear.inbox.take(PATIENCE)
+        finally:
+            ear.close()
+            close_session(router)
+    assert heard is not None
+    assert heard.topic == topics.STOP
+
+
+@pytest.mark.parametrize("name", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_every_signal_that_ends_a_program_asks_for_the_end_and_no_longer(name: signal.Signals) -> None:
+    before = signal.getsignal(name)
+    ending = Ending()
+    ending.on_signals()
+    try:
+        signal.raise_signal(name)
+    finally:
+        ending.leave_signals()
+    assert ending.asked
+    assert signal.getsignal(name) == before
+
+
+def test_who_is_to_outlive_its_terminal_does() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    ending = Ending()
+    try:
+        ending.on_signals()
+        signal.raise_signal(signal.SIGHUP)
+    finally:
+        ending.leave_signals()
+        signal.signal(signal.SIGHUP, before)
+    assert not ending.asked
 
 
 def test_nodes_that_share_a_process_do_what_they_would_do_alone() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from hil.live.watch import Picture, Watch
 from hil.wire import message_types as msg
 from hil.wire.messages import encode, header, to_time
-from hil.wire.session import Endpoints, close_session, free_endpoint, open_session
+from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
 from hil.wire.topics import Topics
 
 PATIENCE = 3.0
@@ -33,7 +33,8 @@ def command(stop: str) -> msg.Command:
 
 
 def test_an_estimate_that_cannot_be_is_not_shown_and_hides_nothing_else() -> None:
-    session = open_session(Endpoints(listen=free_endpoint()))
+    with reserved_endpoint() as endpoint:
+        session = open_session(Endpoints(listen=endpoint))
     watch = Watch(session, [PAIR])
     try:
         session.put(PAIR.estimate, encode(estimate(status=1)))

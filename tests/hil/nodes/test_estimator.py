@@ -209,7 +209,8 @@ def test_a_stranger_beside_the_pair_is_counted_and_the_pair_is_used() -> None:
 def test_frames_twice_late_and_too_late_are_told_apart() -> None:
     events = [event for event in drive(60) if event[1].topic == topics.RIGID_BODIES]
     held_back, forgotten = events.pop(50), events.pop(10)
-    state, _ = fed([*events, held_back, held_back, forgotten])
+    late = [(WARM_NS, event) for _, event in (held_back, held_back, forgotten)]
+    state, _ = fed([*events, *late])
     assert state.refused == {"duplicate": 1, "too_late": 1}
     assert (state.taken["used"], state.taken["late"]) == (59, 2)
 
