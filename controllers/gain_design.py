@@ -9,6 +9,12 @@ late, so the open loop is (mu1 s + w^2) / s^2 with the delay in front. Its cross
 and where both gains grow so that the damping stays (mu1 by s, mu_rho by s^2), wc grows by s. The leader's
 steering says how low they may be. From there they grow until delay, noise or the speed limit says stop, each
 with a reserve: within these bounds the tighter law keeps the distance better.
+
+mu_rho has one more bound, by pairs that start far apart. A follower held at v_max with alpha2 at its place
+goes round its leader: theta' = (v_max - v cos theta) / rho and rho' = -v sin theta keep
+rho (v_max - v cos theta) as it is. It leaves this circle only where law (8) asks for less than v_max, so
+where rho (v f - mu1 sin theta) + v cos theta is small; as f < mu_rho, there is such a place on every circle,
+however far, if and only if v mu_rho <= mu1.
 """
 
 from __future__ import annotations
@@ -24,8 +30,15 @@ from formation.steering_margin import settles
 
 PHASE_MARGIN = 0.25 * math.pi
 UNPREDICTED = 0.2
-"""Share of the delay that a prediction with estimated motions leaves: with 0.9 s of delay those gains keep
-the distance best that have their phase margin for about this much (``benchmarks/gains.py``)."""
+"""Share of the delay that a prediction with estimated motions leaves.
+
+An exact prediction leaves the loop none, as the follower knows its own motion; what is left is an error of
+the leader's motion, which high gains follow. So the share depends on the leader. Measured with the prediction
+that carries on its turn (``benchmarks/gains.py --shares``), where the delay binds: behind leaders that steer
+to their k_u in swings of 2 to 4 s, gains for this share keep the distance better than those for less, by up
+to 18 %. Slower swings would bear 0.1, with half to three quarters of the error, but gains are for any
+steering within k_u.
+"""
 STEERING_RESERVE = 1.1
 ALPHA2_WITHIN = 0.2
 _SIGMAS = 3.0
@@ -35,6 +48,7 @@ _PATH = 2.0
 _FASTER = 1.3
 _SWING = 0.5
 _HAIR = 1e-9
+_WHY_FROM_AFAR = "v1 mu_rho within mu1, or a pair that starts far apart may go round at v_max for ever"
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +58,7 @@ class Task:
     ``speeds`` and ``k_u`` of the leader. ``delay`` [s] from a capture to the motion that answers it.
     ``sd_v1``, ``sd_alpha1``, ``sd_rho``, ``sd_alpha2``: of the errors of estimates. ``M_alpha2`` [rad/s]:
     bound of the error of alpha2's rate. ``band``: share of rho_0 by which the distance may be off.
+    ``unpredicted``: share of the delay that the prediction leaves.
     """
 
     rho_0: float
@@ -57,11 +72,12 @@ class Task:
     sd_alpha2: float
     M_alpha2: float
     band: float = 0.4
+    unpredicted: float = UNPREDICTED
 
     @property
     def left_over(self) -> float:
         """Delay [s] that the prediction leaves."""
-        return UNPREDICTED * self.delay
+        return self.unpredicted * self.delay
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,15 +119,19 @@ def design(task: Task) -> Design:
     mu1, mu_rho, why_least = lowest
     growth, why_most = _growth(mu1, mu_rho, task)
     most1, most_rho = growth * mu1, growth * growth * mu_rho
+    # The weakest law that keeps the formation is better than none, be it for pairs that start near it only.
+    from_afar = max(mu_rho, most1 / task.speeds.highest)
+    why_most_rho = _WHY_FROM_AFAR if from_afar < most_rho else why_most
+    most_rho = min(most_rho, from_afar)
     most2, why_most2 = _most_mu2(mu1, task)
     by_error = task.M_alpha2 / math.sin(ALPHA2_WITHIN)
     mu2 = max(by_error, _FASTER * max(mu1, most1))
     bounds = {
         "mu1": Bound(mu1, why_least, most1, why_most),
-        "mu_rho": Bound(mu_rho, why_least, most_rho, why_most),
+        "mu_rho": Bound(mu_rho, why_least, most_rho, why_most_rho),
         "mu2": Bound(max(by_error, _FASTER * mu1), _why_mu2(by_error, mu1, task), most2, why_most2),
     }
-    # mu1 and mu_rho share their bounds: one is enough to say.
+    # What is more than mu1 bears is more than mu_rho bears: one is enough to say.
     broken = [
         f"{name} needs {bound.least:.3g} ({bound.why_least}) but bears {bound.most:.3g} ({bound.why_most})"
         for name, bound in bounds.items()
@@ -121,7 +141,8 @@ def design(task: Task) -> Design:
         return Design(None, "; ".join(broken), bounds, math.nan, math.nan, _note(task))
     crossover, phase = _crossover(most1, most_rho, task)
     margins = (phase - crossover * task.left_over, phase / crossover)
-    return Design((most1, mu2, most_rho), None, bounds, *margins, _note(task))
+    notes = _note(task, task.speeds.highest * most_rho / most1)
+    return Design((most1, mu2, most_rho), None, bounds, *margins, notes)
 
 
 def _growth(mu1: float, mu_rho: float, task: Task) -> tuple[float, str]:
@@ -172,14 +193,21 @@ def _out_of_reach(task: Task) -> str | None:
     return None
 
 
-def _note(task: Task) -> str | None:
+def _note(task: Task, pull: float = 0.0) -> str | None:
+    """What to know of gains; ``pull``: v mu_rho in mu1."""
+    notes: list[str] = []
     held = (task.limits.v_max - task.speeds.highest) / task.rho_0
-    if held >= task.k_u - _HAIR:
-        return None
-    return (
-        f"outside a leader at {task.speeds.highest:g} m/s the follower is fast enough for lasting turns of "
-        f"up to {held:.3g} rad/s only; harder ones have to be short"
-    )
+    if held < task.k_u - _HAIR:
+        notes.append(
+            f"outside a leader at {task.speeds.highest:g} m/s the follower is fast enough for lasting turns "
+            f"of up to {held:.3g} rad/s only; harder ones have to be short"
+        )
+    if pull > 1.0 + _HAIR:
+        notes.append(
+            f"start near the formation: v1 mu_rho is {pull:.3g} mu1, so that from afar the pair may go round "
+            "at v_max for ever"
+        )
+    return "; ".join(notes) or None
 
 
 def _lowest(task: Task) -> tuple[float, float, str] | None:

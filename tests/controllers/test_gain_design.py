@@ -4,9 +4,12 @@ import cmath
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from controllers.attraction import settling_map
 from controllers.gain_design import PHASE_MARGIN, Task, design
+from controllers.laws import Gains
 from controllers.limits import Limits
 from formation.invariant_set import Disturbed, invariant_set
 from formation.spacing import Spacing
@@ -47,6 +50,27 @@ def test_the_proposed_gains_do_what_is_asked(task: Task) -> None:
     assert kept is not None
     assert (1.0 - task.band) * task.rho_0 <= kept.rho_min < kept.rho_max <= (1.0 + task.band) * task.rho_0
     assert found.phase_margin >= PHASE_MARGIN - 1e-9
+
+
+@pytest.mark.parametrize("limits", [TASK.limits, Limits(0.6, 6.0)])
+def test_pairs_come_together_from_afar_and_would_not_with_a_harder_pull(limits: Limits) -> None:
+    mu1, mu2, mu_rho = gains(replace(TASK, limits=limits))
+    rho, alpha1 = TASK.rho_0 * np.array([2.0, 5.0, 25.0]), np.linspace(-2.6, 3.1, 6)
+
+    def settled(pull: float) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+        with_gains = Gains(mu1, mu2, Spacing(TASK.rho_0, pull * mu_rho))
+        found = settling_map(with_gains, limits, 0.08, rho, alpha1, 0.5 * math.pi, 300.0)
+        return np.isfinite(found.settled_s)
+
+    assert np.all(settled(1.0))
+    assert not np.any(settled(1.4)[1:])
+
+
+def test_where_only_a_hard_pull_keeps_the_formation_it_is_noted() -> None:
+    found = design(replace(TASK, speeds=SpeedRange(0.06, 0.09), band=0.25))
+    assert found.gains is not None, found.why
+    assert found.note is not None
+    assert "start near the formation" in found.note
 
 
 def test_with_the_delay_of_the_margin_the_loop_swings_for_ever() -> None:
