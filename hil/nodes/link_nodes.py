@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from hil.nodes.controller import ControllerNode
-from hil.nodes.estimator import EstimatorNode
 from hil.scenario.links import Link
+
+if TYPE_CHECKING:
+    from hil.nodes.estimator import EstimatorNode
 
 
 def estimator_node(link: Link) -> EstimatorNode:
     """Estimator of a follower; it looks at its predecessor and at itself, and at nobody else."""
+    # Brings compiled code along: a second of imports that a controller has no use for.
+    from hil.nodes.estimator import EstimatorNode
+
     return EstimatorNode(link.scenario, link.node_name("estimator"), link.others)
 
 

@@ -71,7 +71,7 @@ def assert_same(found: Belief, wanted: Belief) -> None:
 
 @pytest.mark.parametrize("pair", PAIRS, ids=IDS)
 @given(belief=beliefs(), dt=durations, follower=motions)
-@settings(max_examples=100)
+@settings(max_examples=60)
 def test_predictions_are_filterpys(
     pair: tuple[Estimator, Estimator], belief: Belief, dt: float, follower: FollowerMotion
 ) -> None:
@@ -81,7 +81,7 @@ def test_predictions_are_filterpys(
 
 @pytest.mark.parametrize("pair", PAIRS, ids=IDS)
 @given(belief=beliefs(), measurement=measurements())
-@settings(max_examples=100)
+@settings(max_examples=60)
 def test_updates_are_filterpys(
     pair: tuple[Estimator, Estimator], belief: Belief, measurement: Measurement
 ) -> None:

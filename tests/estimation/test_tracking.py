@@ -32,7 +32,8 @@ LIMITS = LeaderLimits(v_eps=0.04, k_v=0.1, k_u=0.7)
 NOISE = PoseNoise(position=3e-4, heading=math.radians(0.2))
 COARSE = PoseNoise(position=3e-3, heading=math.radians(1.0))
 DRIVING = Motion(0.08, 0.5)
-CASES = [(kind, front_end) for kind in ESTIMATORS for front_end in FrontEnd]
+# Filterpy's filters are the peers of the compiled ones and give the same; other tests hold them to that.
+CASES = [(kind, front_end) for kind in ESTIMATORS if "filterpy" not in kind for front_end in FrontEnd]
 KALMAN = [(kind, front_end) for kind, front_end in CASES if kind != "difference"]
 
 
@@ -165,7 +166,7 @@ def test_when_it_says_tracking_the_direction_is_known(kind: str, front_end: Fron
 
 
 @pytest.mark.parametrize(("kind", "front_end"), CASES)
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_the_order_of_arrival_within_the_window_does_not_matter_to_the_last_bit(
     kind: str, front_end: FrontEnd, seed: int
 ) -> None:
@@ -253,13 +254,15 @@ def test_one_that_jumped_far_is_given_time_to_come_back_until_it_is_lost(
     run = drive(front_end, 8, 420)
     jumped = [moved(m, 0.5, -0.3) if k >= 150 else m for k, m in enumerate(run.measurements)]
     of = tracker(kind, front_end)
-    for back in (200, 260):
-        track, verdicts = folded(of, jumped[:back] + run.measurements[back : back + 60])
-        assert set(verdicts[150:back]) == {Verdict.GATED}
-        assert verdicts[back:].count(Verdict.GATED) <= 5
+    gone, _ = folded(of, jumped[:150])
+    for since, back in ((150, 200), (200, 260)):
+        gone, verdicts = folded(of, jumped[since:back], gone)
+        assert set(verdicts) == {Verdict.GATED}
+        track, verdicts = folded(of, run.measurements[back : back + 60], gone)
+        assert verdicts.count(Verdict.GATED) <= 5
         assert status_now(of, track) is Status.TRACKING
-    track, verdicts = folded(of, jumped)
-    assert verdicts[150:271] == [Verdict.GATED] * 120 + [Verdict.RESTARTED]
+    track, verdicts = folded(of, jumped[260:], gone)
+    assert verdicts[:11] == [Verdict.GATED] * 10 + [Verdict.RESTARTED]
     assert status_now(of, track) is Status.TRACKING
 
 
@@ -322,8 +325,7 @@ def test_coasting_follows_the_leader_round_its_curve(kind: str, front_end: Front
 
 
 @pytest.mark.parametrize(("kind", "front_end"), CASES)
-@pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("noise", [NOISE, COARSE])
+@pytest.mark.parametrize(("seed", "noise"), [(0, NOISE), (1, COARSE)])
 def test_a_leader_that_stands_is_never_tracked(
     kind: str, front_end: FrontEnd, seed: int, noise: PoseNoise
 ) -> None:

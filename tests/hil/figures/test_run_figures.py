@@ -51,10 +51,6 @@ def test_a_run_is_drawn_small_and_the_same_every_time(short_log: Log, tmp_path: 
     assert ink(first) > 0.05
 
 
-def lacks_nothing(evidence: Evidence) -> Evidence:
-    return evidence
-
-
 def lacks_speeds(evidence: Evidence) -> Evidence:
     poses = [replace(each, v1=NAN, u1=NAN, v2=NAN, u2=NAN) for each in evidence.truth]
     return replace(evidence, truth=poses, commands=[], motion_since_ns=None, frames=None)
@@ -72,10 +68,13 @@ def lacks_all(evidence: Evidence) -> Evidence:
     return replace(lacks_truth(evidence), estimates=[])
 
 
+def test_all_that_is_known_has_its_panel(exact_evidence: Evidence) -> None:
+    assert tuple(map(len, panels_for(Shown.of(exact_evidence)))) == (1, 4, 4)
+
+
 @pytest.mark.parametrize(
     ("lack", "panels"),
     [
-        (lacks_nothing, (1, 4, 4)),
         (lacks_speeds, (0, 3, 3)),
         (lacks_truth, (0, 3, 2)),
         (lacks_estimates, (1, 3, 2)),

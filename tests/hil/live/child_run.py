@@ -55,7 +55,7 @@ class Run:
         while not what():
             assert self.process.poll() is None, self.process.communicate()[1]
             assert time.monotonic() < deadline, "waited in vain"
-            time.sleep(0.02)
+            time.sleep(0.05)
 
     def wait_until_driving(self, *truths: str) -> None:
         """Wait until leader and follower of every pair drive: ``truths`` are the topics that tell."""

@@ -273,8 +273,7 @@ def rough_inputs(tmp_path_factory: pytest.TempPathFactory) -> list[Timed]:
     ]
 
 
-@pytest.mark.parametrize("front_end", ["world", "body"])
-@pytest.mark.parametrize("kind", ["ekf", "ukf"])
+@pytest.mark.parametrize(("kind", "front_end"), [("ekf", "body"), ("ukf", "world")])
 def test_over_a_whole_log_the_compiled_filter_is_filterpys(
     rough_inputs: list[Timed], kind: str, front_end: str
 ) -> None:

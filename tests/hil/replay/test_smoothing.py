@@ -32,10 +32,16 @@ def rough_log(tmp_path_factory: pytest.TempPathFactory) -> Log:
     return read_log(path)
 
 
-def replayed(log: Log, kind: str) -> Replay:
-    own = scenario_of(log)
+@pytest.fixture(scope="module")
+def filtered(rough_log: Log) -> Replay:
+    return replay(rough_log)
+
+
+@pytest.fixture(scope="module")
+def smoothed(rough_log: Log) -> Replay:
+    own = scenario_of(rough_log)
     assert own is not None
-    return replay(log, with_overrides(own, [f"estimator.kind={kind}"]))
+    return replay(rough_log, with_overrides(own, ["estimator.kind=smoother"]))
 
 
 def rmse(log: Log, played: Replay) -> dict[str, float]:
@@ -47,31 +53,34 @@ def captures(estimates: Sequence[LeaderEstimate]) -> list[int]:
     return [to_ns(each.header.stamp) for each in estimates]
 
 
-def test_a_log_is_smoothed_at_each_of_its_captures_once_and_in_order(rough_log: Log) -> None:
-    played, filtered = replayed(rough_log, "smoother"), replay(rough_log)
-    assert played.commands == ()
-    assert not played.parity
-    assert captures(played.estimates) == sorted({*captures(played.estimates)})
-    assert {*captures(filtered.estimates)} <= {*captures(played.estimates)}
-    assert played.scenario.estimator.kind == "smoother"
-    assert played.estimator.taken == filtered.estimator.taken
-    assert all(np.linalg.eigvalsh(each.covariance.reshape(5, 5))[0] > 0.0 for each in played.estimates)
+def test_a_log_is_smoothed_at_each_of_its_captures_once_and_in_order(
+    smoothed: Replay, filtered: Replay
+) -> None:
+    assert smoothed.commands == ()
+    assert not smoothed.parity
+    assert captures(smoothed.estimates) == sorted({*captures(smoothed.estimates)})
+    assert {*captures(filtered.estimates)} <= {*captures(smoothed.estimates)}
+    assert smoothed.scenario.estimator.kind == "smoother"
+    assert smoothed.estimator.taken == filtered.estimator.taken
+    assert all(np.linalg.eigvalsh(each.covariance.reshape(5, 5))[0] > 0.0 for each in smoothed.estimates)
 
 
-def test_smoothed_estimates_are_closer_to_the_truth_than_the_filter_s(rough_log: Log) -> None:
-    smoothed, filtered = (rmse(rough_log, replayed(rough_log, kind)) for kind in ("smoother", "ekf"))
-    assert smoothed["v1"] < 0.7 * filtered["v1"]
-    assert smoothed["alpha1"] < 0.7 * filtered["alpha1"]
+def test_smoothed_estimates_are_closer_to_the_truth_than_the_filter_s(
+    rough_log: Log, smoothed: Replay, filtered: Replay
+) -> None:
+    after, live = rmse(rough_log, smoothed), rmse(rough_log, filtered)
+    assert after["v1"] < 0.7 * live["v1"]
+    assert after["alpha1"] < 0.7 * live["alpha1"]
 
 
-def test_the_leader_s_start_is_not_smeared_into_its_rest(rough_log: Log) -> None:
+def test_the_leader_s_start_is_not_smeared_into_its_rest(smoothed: Replay, filtered: Replay) -> None:
     """While the leader stands the direction is not known; from when it drives on it is, without a delay."""
-    statuses = [Status(each.status) for each in replayed(rough_log, "smoother").estimates]
+    statuses = [Status(each.status) for each in smoothed.estimates]
     first = statuses.index(Status.TRACKING)
     assert statuses[0] is Status.INITIALISING
     driving = statuses[first:-90]  # the robots stop before the end
     assert driving.count(Status.TRACKING) > 0.98 * len(driving)
-    live = [Status(each.status) for each in replay(rough_log).estimates]
+    live = [Status(each.status) for each in filtered.estimates]
     assert first < live.index(Status.TRACKING)
 
 
