@@ -173,12 +173,13 @@ class _Fit:
 
     def _covariance(self, p: Vector, off: Vector) -> FloatArray | None:
         """Covariances (2, 6, 6) by independent errors and by blocks; None where they are not determined."""
-        slopes, weights = self._slopes(p), 1.0 / np.sqrt(1.0 + off**2)
+        slopes = self._slopes(p)
+        # The loss 2 (sqrt(1 + r^2) - 1) pulls by r / sqrt(1 + r^2), which grows by (1 + r^2)^(-3/2).
+        pulls = slopes * (off / np.sqrt(1.0 + off**2))[:, np.newaxis]
         try:
-            inverse = np.linalg.inv(slopes.T @ (slopes * weights[:, np.newaxis]))
+            inverse = np.linalg.inv(slopes.T @ (slopes * ((1.0 + off**2) ** -1.5)[:, np.newaxis]))
         except np.linalg.LinAlgError:
             return None
-        pulls = slopes * (weights * off)[:, np.newaxis]
         times = self.answers.times
         count = max(_BLOCKS, math.floor((times[-1] - times[0]) / _BLOCK))
         block = np.minimum((times - times[0]) / (times[-1] - times[0]) * count, count - 1).astype(np.int64)

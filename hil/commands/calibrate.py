@@ -73,6 +73,8 @@ def command(log: Path, follower: str | None, from_s: float | None, to_s: float |
 
 def _say_timing(timing: Timing, scenario: Scenario) -> dict[str, object]:
     """Print the timing, what is unknown of it, and its settings, and return it for JSON."""
+    from hil.replay.timing import VAGUE
+
     result: dict[str, object] = {}
     for name, known in timing.keys(scenario).items():
         click.echo(f"{name:19} {known.value:+.4f} s give or take {known.sd:.4f}: {_MEANINGS[name]}", err=True)
@@ -80,6 +82,8 @@ def _say_timing(timing: Timing, scenario: Scenario) -> dict[str, object]:
     for line in timing.unknown:
         click.echo(line, err=True)
     settings = timing.settings(scenario)
+    if timing.lateness is not None and timing.lateness.sd >= VAGUE:
+        click.echo("the offset of stamps is too uncertain to be set: drive for 30 s", err=True)
     if settings:
         told = " ".join(f"--set {key}={value:.4f}" for key, value in settings.items())
         click.echo(f"run next with: {told}", err=True)

@@ -25,6 +25,9 @@ LEAST_EARLY = 0.005
 """An answer that comes before its command by more than both, in standard deviations and [s], shows odometry
 that is stamped too early; by less it shows noise."""
 
+VAGUE = 0.01
+"""A correction of stamps that is less certain than this [s] may do more harm than good."""
+
 Motions = dict[int, tuple[float, float]]
 """Speed [m/s] and turn rate [rad/s] by time [ns]."""
 
@@ -71,7 +74,8 @@ class Timing:
         """Scenario keys that make the next run right, in seconds to a tenth of a millisecond.
 
         A robot cannot answer before it is told to: an answer that comes clearly too early shows odometry that
-        is stamped early, which is moved by ``estimator.input_delay_s``, and with it the stamps of mocap.
+        is stamped early, which is moved by ``estimator.input_delay_s``, and with it the stamps of mocap. A
+        correction of stamps that is less certain than :data:`VAGUE` is left out.
         """
         found = self.keys(scenario)
         given: dict[str, float] = {}
@@ -85,8 +89,9 @@ class Timing:
             given["controller.lag_s"] = max(0.0, found["delay_s"].value + early - way)
             given["controller.transport_s"] = way
         name, before = _correction(scenario)
-        if name in found or early:
-            late = (found[name].value if name in found else before) - early
+        sure = name in found and found[name].sd < VAGUE
+        if sure or early:
+            late = (found[name].value if sure else before) - early
             given[f"estimator.{name}"] = max(0.0, late) if name == "transport_latency_s" else late
         return {key: round(value, 4) + 0.0 for key, value in given.items()}
 

@@ -10,7 +10,7 @@ from estimation.actuator_response import ActuatorResponse, fit_response
 from estimation.input_alignment import Known
 from formation.angles import FloatArray
 
-FINE = 5e-4
+FINE = 1e-4
 NOISE = np.array([0.002, 0.01])
 
 
@@ -41,7 +41,7 @@ def measured(
     return places * FINE, motion[places] + NOISE * generator.normal(size=(len(at), 2))
 
 
-def near(known: Known, true: float, slack: float = 1e-3) -> bool:
+def near(known: Known, true: float, slack: float = 5e-4) -> bool:
     return abs(known.value - true) < 4.0 * known.sd + slack
 
 
@@ -64,8 +64,20 @@ def test_lag_and_delay_are_found_within_what_is_said_of_them(
     assert near(found.transport, delay)
     assert near(found.delay, lag + delay)
     assert near(found.gain_v, gain, 2e-3)
-    assert found.delay.sd < 0.005
+    assert found.delay.sd < 0.01
     assert found.delay.value == pytest.approx(found.lag.value + found.transport.value, abs=1e-9)
+
+
+def test_standard_deviations_are_those_of_the_errors() -> None:
+    errors = []
+    for seed in range(12):
+        generator = np.random.default_rng(seed)
+        times, commands = commanded(generator, 10.0)
+        found = fit_response(times, commands, *measured(times, commands, 0.1, 0.03, generator))
+        assert found is not None
+        for known, true in ((found.lag, 0.1), (found.transport, 0.03), (found.delay, 0.13)):
+            errors.append((known.value - true) / known.sd)
+    assert 0.6 < np.sqrt(np.mean(np.square(errors))) < 1.5
 
 
 def test_glitches_coarse_odometry_and_a_robot_with_a_lower_limit_hardly_matter() -> None:

@@ -134,13 +134,13 @@ def test_of_a_chain_a_follower_must_be_named(tmp_path: Path, capsys: pytest.Capt
     assert err.count("\n") == 1
 
 
-def timing(transport: float, lateness: float | None) -> Timing:
+def timing(transport: float, lateness: float | None, sd: float = 2e-3) -> Timing:
     """Timing of a robot with 100 ms of lag."""
     sure = Known(1.0, 0.01)
     response = ActuatorResponse(
         Known(transport, 1e-3), Known(0.1, 1e-3), Known(transport + 0.1, 1e-3), sure, sure, 900, 0
     )
-    return Timing(response, None if lateness is None else Known(lateness, 2e-3))
+    return Timing(response, None if lateness is None else Known(lateness, sd))
 
 
 def with_estimator(*overrides: str) -> Scenario:
@@ -162,6 +162,8 @@ def with_estimator(*overrides: str) -> Scenario:
             with_estimator(),
             (0.1, 0.0, {"stamp_offset_s": 0.0, "input_delay_s": 0.04}),
         ),
+        # What may be off by more than it is worth is left as it is.
+        (timing(0.0, 0.02, sd=0.015), with_estimator("stamp_offset_s=0.01"), (0.1, 0.0, {})),
         # Of an estimated clock the way is what is left to tell.
         (
             timing(0.0, 0.03),
