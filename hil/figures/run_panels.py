@@ -118,7 +118,7 @@ def draw_u2(axes: Axes, shown: Shown) -> None:
 
 
 def draw_latency(axes: Axes, shown: Shown) -> None:
-    """From the capture of every frame to the first command that rests on it."""
+    """From every capture to the first command that rests on an estimate of it."""
     commands = shown.columns.commands
     first = commands.fresh
     waits_ms = (commands.issued_ns - commands.capture_ns)[first] * 1e-6

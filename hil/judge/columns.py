@@ -64,7 +64,10 @@ class EstimateColumns:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CommandColumns:
-    """Commands as arrays of shape (n,): when issued, the capture behind them, what was sent, and flags."""
+    """Commands as arrays of shape (n,): when issued, the capture behind them, what was sent, and flags.
+
+    ``fresh``: the first command on a capture; later ones may rest on it as a late frame has changed it.
+    """
 
     issued_ns: Stamps
     capture_ns: Stamps
@@ -77,14 +80,18 @@ class CommandColumns:
     @staticmethod
     def of(commands: Sequence[Command]) -> CommandColumns:
         """Columns of messages, in their order."""
+        capture_ns = np.array([to_ns(c.capture) for c in commands], dtype=np.int64)
+        fresh = np.flatnonzero([c.fresh for c in commands])
+        first = np.zeros(len(commands), dtype=np.bool_)
+        first[fresh[np.unique(capture_ns[fresh], return_index=True)[1]]] = True
         return CommandColumns(
             issued_ns=np.array([to_ns(c.header.stamp) for c in commands], dtype=np.int64),
-            capture_ns=np.array([to_ns(c.capture) for c in commands], dtype=np.int64),
+            capture_ns=capture_ns,
             v2=np.array([c.v2 for c in commands], dtype=np.float64),
             u2=np.array([c.u2 for c in commands], dtype=np.float64),
             saturated=np.array([c.saturated for c in commands], dtype=np.bool_),
             stopped=np.array([bool(c.stop) for c in commands], dtype=np.bool_),
-            fresh=np.array([c.fresh for c in commands], dtype=np.bool_),
+            fresh=first,
         )
 
 

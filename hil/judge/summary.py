@@ -75,7 +75,7 @@ def _frames(evidence: Evidence) -> dict[str, int | None]:
 
 
 def _latency(columns: Columns) -> dict[str, dict[str, float]]:
-    """From the capture of a frame to the first command that rests on it."""
+    """From a capture to the first command that rests on an estimate of it."""
     commands = columns.commands
     first = commands.fresh & _in_run(columns)
     if not np.any(first):

@@ -139,6 +139,18 @@ def test_latency_is_from_capture_to_the_first_command_on_it(exact_evidence: Evid
     assert found["max"] == 237.0
 
 
+def test_a_capture_estimated_anew_for_a_late_frame_is_no_longer_on_its_way(exact_evidence: Evidence) -> None:
+    """The second of two commands on one capture came of a frame from before it: the first had its way."""
+    begun_ns = to_ns(exact_evidence.commands[0].header.stamp)
+    commands = [
+        replace(each, capture=to_time(begun_ns + 20_000_000 * (number // 2) - 5_000_000), fresh=True,
+                header=replace(each.header, stamp=to_time(begun_ns + 10_000_000 * number)))
+        for number, each in enumerate(exact_evidence.commands[:100])
+    ]  # fmt: skip
+    found = summarise(replace(exact_evidence, commands=commands))["latency_ms"]["capture_to_command"]
+    assert found == pytest.approx({"p50": 5.0, "p99": 5.0, "max": 5.0})
+
+
 def test_commands_after_the_stop_do_not_count(exact_evidence: Evidence) -> None:
     middle = to_ns(exact_evidence.commands[100].header.stamp)
     commands = [
