@@ -78,9 +78,13 @@ class Store:
         mark = self._parts / "sweep.sha256"
         try:
             self._parts.mkdir(parents=True, exist_ok=True)
-            if mark.exists() and mark.read_text() != sweep.digest():
+            if not mark.exists():
+                # Whole or not there, and left alone ever after: half a mark would be that of another sweep.
+                unfinished = mark.with_suffix(".unfinished")
+                unfinished.write_text(sweep.digest())
+                os.replace(unfinished, mark)
+            elif mark.read_text() != sweep.digest():
                 raise UsageError(f"--out {folder}: holds another sweep; give another folder, or remove it")
-            mark.write_text(sweep.digest())
         except OSError as error:
             raise UsageError(f"--out {folder}: cannot be used ({error.strerror}); give another") from None
 

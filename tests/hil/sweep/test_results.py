@@ -108,6 +108,25 @@ def test_an_interrupted_sweep_goes_on_and_ends_the_same(
         flown(make_sweep(seed=5), cut)
 
 
+def test_a_sweep_that_was_killed_while_it_marked_its_folder_goes_on(
+    make_sweep: Callable[..., Sweep], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sweep = make_sweep()
+    Store(tmp_path, sweep)
+
+    def killed(path: Path, _text: str) -> int:
+        path.open("w").close()
+        raise KeyboardInterrupt
+
+    for folder in (tmp_path, tmp_path / "new"):
+        with monkeypatch.context() as patched, suppress(KeyboardInterrupt):
+            patched.setattr(Path, "write_text", killed)
+            Store(folder, sweep)
+        Store(folder, sweep)
+        with pytest.raises(UsageError, match="another sweep"):
+            Store(folder, make_sweep(seed=5))
+
+
 def test_two_workers_give_the_bits_of_one(make_sweep: Callable[..., Sweep], tmp_path: Path) -> None:
     sweep = make_sweep()
     one, two = flown(sweep, tmp_path / "one"), flown(sweep, tmp_path / "two", workers=2)
