@@ -41,7 +41,3 @@ class Limits:
         allowed = Motion(clip(wanted.v, self.v_max), clip(wanted.u, self.u_max))
         saturated = abs(wanted.v) > self.v_max or abs(wanted.u) > self.u_max
         return allowed, saturated
-
-    def allow(self, motion: Motion) -> bool:
-        """Whether both are finite and within their limits."""
-        return abs(motion.v) <= self.v_max and abs(motion.u) <= self.u_max

@@ -35,7 +35,8 @@ def simulate(scenario: Scenario, out: Path | None, *, stability: bool = False) -
     true region is larger). ``orbit.floquet`` is the largest modulus of the Floquet multipliers. The motion is
     not limited, as in the proofs.
 
-    Orders to change sides are treated as by the controller daemon; ``orders_refused`` says why, if they are.
+    With orders to change sides it is limited, and they are treated as by the controller daemon;
+    ``orders_refused`` says why, if they are refused.
 
     With ``stability``, ``stability`` too: the propositions checked by :mod:`hil.stability`, and its picture.
 

@@ -33,7 +33,7 @@ def command(
 ) -> None:
     """Integrate SCENARIO without noise or delay, as the paper does, and report on it.
 
-    A pair drives without limits, a chain or a flock of agents within them.
+    A pair drives without limits, unless it is told to change sides; a chain or a flock of agents within them.
     """
     chosen = [*overrides]
     if law is not None:

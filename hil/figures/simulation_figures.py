@@ -156,23 +156,33 @@ def draw_speed(axes: Axes, scenario: Scenario, trajectory: Trajectory) -> None:
     if scenario.formation.change_sides_at_s:
         across = np.copysign(across, trajectory.alpha2)
     desired = trajectory.v1 + scenario.formation.rho_0 * trajectory.u1 / across
-    _draw_control(axes, trajectory.t, trajectory.v2, desired, scenario.controller.v_max)
+    limit = _named_limit(scenario, scenario.controller.v_max)
+    _draw_control(axes, trajectory.t, trajectory.v2, desired, limit)
     axes.set_ylabel("$v_2$ [m/s]")
 
 
 def draw_turn_rate(axes: Axes, scenario: Scenario, trajectory: Trajectory) -> None:
     """Follower's turn rate over time; dashed u1, the rate that holds the formation exactly."""
-    _draw_control(axes, trajectory.t, trajectory.u2, trajectory.u1, scenario.controller.u_max)
+    limit = _named_limit(scenario, scenario.controller.u_max)
+    _draw_control(axes, trajectory.t, trajectory.u2, trajectory.u1, limit)
     axes.set_ylabel("$u_2$ [rad/s]")
 
 
-def _draw_control(axes: Axes, t: FloatArray, driven: FloatArray, desired: FloatArray, limit: float) -> None:
+def _named_limit(scenario: Scenario, limit: float) -> tuple[float, str]:
+    """A limit and what to call it: only a pair that is told to change sides keeps to it."""
+    return limit, "limit" if scenario.formation.change_sides_at_s else "limit (not applied)"
+
+
+def _draw_control(
+    axes: Axes, t: FloatArray, driven: FloatArray, desired: FloatArray, named_limit: tuple[float, str]
+) -> None:
+    limit, name = named_limit
     axes.plot(t, desired, color=ORBIT, lw=1.0, ls="--", label="desired")
     axes.plot(t, driven, color=FOLLOWER, lw=1.4, label="follower")
     # A limit far outside what is driven would only flatten the curves.
     near = [side for side in (limit, -limit) if 1.5 * driven.min() <= side <= 1.5 * driven.max()]
     for index, side in enumerate(near):
-        label = "limit (not applied)" if index == 0 else None
+        label = name if index == 0 else None
         axes.axhline(side, color=LIMIT, lw=1.0, ls=":", label=label)
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.3 * (high - low))

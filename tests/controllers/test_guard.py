@@ -55,7 +55,7 @@ def test_nothing_unsafe_leaves(
     decision = decide(wanted, limits, age=age, max_age=max_age, settled=settled, lost=lost, stopped=stopped)
     assert math.isfinite(decision.sent.v)
     assert math.isfinite(decision.sent.u)
-    assert limits.allow(decision.sent)
+    assert limits.apply(decision.sent) == (decision.sent, False)
     if decision.stop is not None:
         assert decision.sent == STANDSTILL
         assert not decision.saturated

@@ -25,7 +25,7 @@ def test_on_average_the_robot_gets_what_was_wanted(wanted: Motion) -> None:
     owed, got_v, got_u, count = NOTHING_OWED, 0.0, 0.0, 200
     for _ in range(count):
         sent, owed = STEPS.round(wanted, owed, LIMITS)
-        assert LIMITS.allow(sent)
+        assert LIMITS.apply(sent) == (sent, False)
         assert max(abs(owed.v), abs(owed.u)) <= 0.005 + 1e-12
         got_v, got_u = (
             got_v + as_the_firmware_takes_it(sent.v),
