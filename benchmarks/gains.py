@@ -7,7 +7,7 @@ loop, with the gains of ``abreast gains``, with hand-picked ones (those of ``tur
 speed in ``slow`` and ``fast``), and with the proposed ones times s (mu_rho times s^2).
 
 With ``--shares`` instead: the same with gains proposed for other shares of the delay that the prediction
-leaves, ``controllers.gain_design.UNPREDICTED``, over latencies; a dash where none are.
+leaves, ``controllers.gain_task.UNPREDICTED``, over latencies; a dash where none are.
 """
 
 from __future__ import annotations

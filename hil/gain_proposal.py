@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
-from controllers.gain_design import Design, Task, design
+from controllers.gain_design import Design, design
+from controllers.gain_task import Task
 from estimation.motion import LeaderLimits, ProcessNoise
 from formation.invariant_set import Disturbed, invariant_set
 from formation.shape import ABREAST_ALPHA2

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from controllers.attraction import settling_map
-from controllers.gain_design import PHASE_MARGIN, Task, design
+from controllers.gain_design import PHASE_MARGIN, design
+from controllers.gain_task import Task
 from controllers.laws import Gains
 from controllers.limits import Limits
 from formation.invariant_set import Disturbed, invariant_set
