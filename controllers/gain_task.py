@@ -11,11 +11,11 @@ UNPREDICTED = 0.2
 """Share of the delay that a prediction with estimated motions leaves.
 
 An exact prediction leaves the loop none, as the follower knows its own motion; what is left is an error of
-the leader's motion, which high gains follow. So the share depends on the leader. Measured with the prediction
-that carries on its turn (``benchmarks/gains.py --shares``), where the delay binds: behind leaders that steer
-to their k_u in swings of 2 to 4 s, gains for this share keep the distance better than those for less, by up
-to 18 %. Slower swings would bear 0.1, with half to three quarters of the error, but gains are for any
-steering within k_u.
+the leader's motion, which high gains follow. So the share depends on leader and robot. Measured with the
+prediction that carries on the leader's turn (``benchmarks/gains.py --shares``), where the delay binds: behind
+leaders that steer to their k_u in swings of 2 to 4 s, a robot with little speed to spare keeps the distance
+better with the gains for this share than for less, by up to 18 %. One with speed to spare, or slower swings,
+would bear 0.1 with half to three quarters of the error; but gains are for any steering within k_u.
 """
 
 
