@@ -89,6 +89,9 @@ def command(
     for name, what in (("commands", "commands to the robot"), ("certified", "certified estimates")):
         if name in played.parity and (unrecorded := played.parity[name].unrecorded):
             click.echo(f"{unrecorded} {what} are not in the log: the recorder missed them", err=True)
+    for name, restarts in played.restarts.items():
+        if restarts:
+            click.echo(f"the {name} was started again during the run (times: {restarts})", err=True)
     if as_json:
         print_json(summary)
     if verify and (reason := why_not_same(given, played)):

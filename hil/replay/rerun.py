@@ -34,7 +34,8 @@ class Replay:
     ``parity``: by ``estimates``, ``commands`` and, where the log has any, ``certified``, how they compare
     with the recorded ones; empty where the log was estimated anew. ``missing_inputs``: inputs that were
     consumed live but are not in the log. ``certified``: estimates with radii, where these are asked for.
-    ``controller``: None where there were no commands to repeat.
+    ``controller``: None where there were no commands to repeat. ``restarts``: how often each node was started
+    again during the run.
     """
 
     link: Link
@@ -45,6 +46,7 @@ class Replay:
     parity: Mapping[str, Parity] = field(default_factory=dict)
     missing_inputs: int = 0
     certified: tuple[msg.CertifiedEstimate, ...] = ()
+    restarts: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def scenario(self) -> Scenario:
@@ -93,8 +95,9 @@ def replay_link(log: Log, chosen: Link, own: Link) -> Replay:
         check_inputs(log, chosen.scenario)
         return _estimated_anew(chosen, node, feed(node, logged_events(log, node.subscribes)))
     index = index_by_digest(logged_events(log, node.subscribes))
-    journey = refeed(node, node.topics.estimate, recorded, index)
-    if not same_steps(chosen.scenario, own.scenario):
+    same = same_steps(chosen.scenario, own.scenario)
+    journey = refeed(node, node.topics.estimate, recorded, index, same_node=same)
+    if not same:
         return _estimated_anew(chosen, node, journey)
     parity = {"estimates": parity_of(journey.repeated, node.topics.estimate, {})}
     if chosen.scenario.estimator.certify and own.scenario.estimator.certify:
@@ -161,6 +164,7 @@ def _with_commands(
         },
         missing_inputs=estimator.missing + journey.missing,
         certified=_decoded(estimator.outputs, msg.CertifiedEstimate),
+        restarts={"estimator": estimator.restarts, "controller": journey.restarts},
     )
 
 

@@ -88,6 +88,20 @@ def test_a_life_with_ticks_and_silent_inputs_is_repeated_bit_for_bit(steps: list
     assert again.outputs == journey.outputs
 
 
+@given(lives, lives)
+def test_a_node_that_was_started_again_is_repeated_all_the_same(
+    before: list[tuple[int, int]], after: list[tuple[int, int]]
+) -> None:
+    events, first = live(before)
+    later = [(Event("in", event.payload + b"!"), now_ns + 10**6) for event, now_ns in live(after)[0]]
+    second = feed(TallyNode(), later)
+    outputs = recorded(first) + recorded(second)
+    again = refeed(TallyNode(), "out", outputs, index_by_digest([*events, *later]))
+    parity = parity_of(again.repeated, "out", {"drive": logged_drive(first) + logged_drive(second)})
+    assert (parity.compared, parity.mismatched, again.missing) == (len(outputs), 0, 0)
+    assert again.restarts == (len(recorded(first)) > 0 and len(recorded(second)) > 0)
+
+
 @given(lives, st.data())
 def test_an_input_that_the_log_lacks_is_counted_and_shows_as_a_mismatch(
     steps: list[tuple[int, int]], data: st.DataObject
