@@ -12,6 +12,7 @@ from estimation.clock import Arrival
 from hil.certificate import certificate_json, certificate_of
 from hil.errors import UsageError
 from hil.judge.side_orders import Order, orders_of
+from hil.judge.sound_messages import is_sound
 from hil.log.metadata import IMPORT, mode_of, recorded_certificate, scenario_of
 from hil.log.reader import Log, Record
 from hil.nodes.node import digest
@@ -178,7 +179,7 @@ def evidence_of_link(log: Log, link: Link) -> Evidence:
         truth=truth,
         taken=_group(estimator, "taken"),
         refused=_group(estimator, "refused"),
-        motion_since_ns=None if since is None else int(since),
+        motion_since_ns=int(since) if since and _is_count(since) else None,
         stopped_ns=records[topics.STOP][0].log_ns if records[topics.STOP] else None,
         frames=_frames(scenario, arrivals, truth),
         arrivals=arrivals,
@@ -225,14 +226,14 @@ def _decoded(log: Log, records: Sequence[Record], kind: type[M]) -> list[M]:
 
 
 def _timed(log: Log, records: Sequence[Record], kind: type[M]) -> list[tuple[int, M]]:
-    """Messages of a kind with the time of their record; what cannot be decoded is left out."""
+    """Messages of a kind with the time of their record; what cannot be decoded or be is left out."""
     messages: list[tuple[int, M]] = []
     for record in records:
         try:
             message = log.decode(record)
         except MalformedPayloadError:
             continue
-        if isinstance(message, kind):
+        if isinstance(message, kind) and is_sound(message):
             messages.append((record.log_ns, message))
     return messages
 
@@ -248,7 +249,15 @@ def _last_counts(reports: Sequence[DiagnosticArray]) -> dict[str, dict[str, str]
 
 def _group(values: Mapping[str, str], group: str) -> dict[str, int]:
     prefix = f"{group}."
-    return {key.removeprefix(prefix): int(text) for key, text in values.items() if key.startswith(prefix)}
+    return {
+        key.removeprefix(prefix): int(text)
+        for key, text in values.items()
+        if key.startswith(prefix) and _is_count(text)
+    }
+
+
+def _is_count(text: str) -> bool:
+    return text.isdecimal() and len(text) <= len(str(2**62))
 
 
 def _arrivals(log: Log, records: Sequence[Record], estimates: Sequence[LeaderEstimate]) -> list[Arrival]:
@@ -263,15 +272,11 @@ def _arrivals(log: Log, records: Sequence[Record], estimates: Sequence[LeaderEst
         for name, record in zip(names, records, strict=True)
         if name in got or not estimates
     ]
-    found: list[Arrival] = []
-    for receive_ns, record in sorted(received, key=lambda item: item[0]):
-        for frame in _decoded(log, [record], RigidBodies):
-            try:
-                capture_ns = to_ns(frame.header.stamp)
-            except MalformedPayloadError:
-                continue  # the estimator refused it too
-            found.append(Arrival(frame.frame_number, capture_ns, receive_ns))
-    return found
+    return [
+        Arrival(frame.frame_number, to_ns(frame.header.stamp), receive_ns)
+        for receive_ns, record in sorted(received, key=lambda item: item[0])
+        for frame in _decoded(log, [record], RigidBodies)
+    ]
 
 
 def _frames(scenario: Scenario, arrivals: Sequence[Arrival], truth: Sequence[Truth]) -> Frames | None:

@@ -40,15 +40,15 @@ class FrameTime:
     def of(self, times: HostTime, frame: Frame, now_ns: int) -> Timed:
         """Time of a frame received at ``now_ns``, and what is known of the clock after it.
 
-        A frame is refused by cause: bad_stamp (trusted, and in the future), clock_unknown (estimated, at the
-        begin), clock_jump (estimated, while it may have jumped).
+        A frame is refused by cause: bad_stamp (trusted, and in the future, or before 1970), clock_unknown
+        (estimated, at the begin), clock_jump (estimated, while it may have jumped).
         """
         arrival = Arrival(frame.frame_number, frame.capture_ns, now_ns)
         if self.trusted:
             clock = heard(times.clock, arrival)
             jumped = clock.jumps > times.clock.jumps
             capture_ns = frame.capture_ns - self.offset_ns
-            refusal = "bad_stamp" if capture_ns > now_ns + CLOCK_TOLERANCE_NS else ""
+            refusal = "" if 0 <= capture_ns <= now_ns + CLOCK_TOLERANCE_NS else "bad_stamp"
             return Timed(HostTime(clock), capture_ns, refusal, restart=jumped)
         after, mapped_ns = on_host(times, arrival, self.latency_ns)
         if mapped_ns is None:

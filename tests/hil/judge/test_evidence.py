@@ -8,13 +8,16 @@ import pytest
 
 from hil.errors import UsageError
 from hil.judge.evidence import Evidence, Frames, Span, evaluation_span, evidence_of_log, run_span
+from hil.judge.summary import summarise
 from hil.log.metadata import log_metadata
 from hil.log.reader import Log, read_log
 from hil.log.writer import LogWriter
 from hil.nodes.node import digest
+from hil.scenario.files import load_scenario
+from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.message_types import Consumed, RigidBodies
-from hil.wire.messages import encode, header, to_ns, to_time, typename_of
+from hil.wire.messages import decode_as, encode, header, to_ns, to_time, typename_of
 
 SECOND = 1_000_000_000
 
@@ -103,3 +106,41 @@ def test_what_is_judged(exact_evidence: Evidence) -> None:
     recorded = replace(exact_evidence, motion_since_ns=None, stopped_ns=None)
     last = to_ns(exact_evidence.estimates[-1].header.stamp)
     assert evaluation_span(recorded) == Span(start + SECOND, last)
+
+
+def test_what_cannot_be_is_left_out_whoever_has_sent_it(short_log: Log, tmp_path: Path) -> None:
+    never = replace(header(1, ""), stamp=replace(to_time(1), sec=-1))
+    estimate = decode_as(next(short_log.records(["follower/leader_estimate"])).payload, msg.LeaderEstimate)
+    command = decode_as(next(short_log.records(["follower/command"])).payload, msg.Command)
+    nonsense: dict[str, list[msg.Message]] = {
+        "follower/leader_estimate": [replace(estimate, header=never), replace(estimate, status=77)],
+        "follower/command": [replace(command, capture=never.stamp)],
+        "truth": [msg.Truth(never, 1, *[0.0] * 10)],
+        "rigid_bodies": [msg.RigidBodies(never, 1, [])],
+    }
+    path = tmp_path / "more.mcap"
+    with LogWriter(path, short_log.metadata) as log:
+        for record in short_log.records():
+            log.write(record.topic, record.typename, record.payload, record.log_ns, record.publish_ns)
+        for topic, messages in nonsense.items():
+            for message in messages:
+                assert short_log.end_ns is not None
+                log.write(topic, typename_of(message), encode(message), short_log.end_ns, short_log.end_ns)
+    wanted, found = (summarise(evidence_of_log(each)) for each in (short_log, read_log(path)))
+    assert wanted.pop("log") != found.pop("log")
+    assert found == wanted
+
+
+def test_counts_that_are_none_are_left_out(tmp_path: Path) -> None:
+    odd = {"taken.used": "many", "taken.frames": "9" * 5000, "refused.gated": "-1", "motion_since_ns": "soon"}
+    told = [msg.KeyValue(key=key, value=value) for key, value in odd.items()]
+    nodes = [
+        msg.DiagnosticStatus(level=0, name=name, message="", hardware_id="", values=told)
+        for name in ("abreast/estimator", "abreast/emulator")
+    ]
+    report = msg.DiagnosticArray(header=header(1, ""), status=nodes)
+    path = tmp_path / "odd.mcap"
+    with LogWriter(path, log_metadata(load_scenario("turtlebot3"), "live")) as log:
+        log.write("diagnostics", typename_of(report), encode(report), 1, 1)
+    evidence = evidence_of_log(read_log(path))
+    assert (evidence.taken, evidence.refused, evidence.motion_since_ns) == ({}, {}, None)

@@ -148,3 +148,11 @@ def test_trusted_stamps_are_put_right_by_their_offset_before_they_are_judged() -
 def test_stamps_are_not_corrected_twice() -> None:
     with pytest.raises(UsageError, match=r"estimator.stamp_offset_s is 0.1: .*give estimator.transport_l"):
         node_with("estimator.stamp_offset_s=0.1", "estimator.clock=estimated")
+
+
+def test_a_stamp_that_would_lie_before_1970_is_refused() -> None:
+    node = node_with("estimator.stamp_offset_s=0.5")
+    pair = [("leader", Pose(0.3, 0.0, 1.5)), ("follower", Pose(0.7, 0.1, 1.6))]
+    frame = Event(topics.RIGID_BODIES, encode(frame_message(0, 0, pair)))
+    state, sent = node.step(node.begin(EPOCH_NS), frame, EPOCH_NS)
+    assert (dict(state.refused), sent) == ({"bad_stamp": 1}, ())
