@@ -19,6 +19,7 @@ from estimation.bounds import (
 )
 from formation.angles import FloatArray, wrap
 from formation.spacing import Spacing
+from formation.station import ABREAST, Station
 
 QUANTITY_OF = {
     "v1": "v1",
@@ -61,10 +62,11 @@ def all_bounds(
     v_eps: Values,
     mu1: float,
     spacing: Spacing,
+    station: Station = ABREAST,
 ) -> dict[str, FloatArray]:
     """Every named bound for the same moment(s): the keys of ``bounds`` in the JSON of a run."""
-    sound = sound_bounds(perceived, rates, v_eps, mu1, spacing)
-    extended = extended_bounds(perceived, rates, inputs, v_eps, mu1, spacing)
+    sound = sound_bounds(perceived, rates, v_eps, mu1, spacing, station)
+    extended = extended_bounds(perceived, rates, inputs, v_eps, mu1, spacing, station)
     return {
         "v1": sound.v1,
         "alpha1": sound.alpha1,
@@ -77,29 +79,32 @@ def all_bounds(
     }
 
 
-def h_of(truth: SpeedInputs, believed: SpeedInputs, mu1: float, spacing: Spacing) -> FloatArray:
+def h_of(
+    truth: SpeedInputs, believed: SpeedInputs, mu1: float, spacing: Spacing, station: Station = ABREAST
+) -> FloatArray:
     """Second component of h [rad/s]: the alpha1 dynamics of (5) under law (8), without the leader's -u1.
 
     (v1 sin(alpha1) + v2_hat) / rho, where v2_hat is the speed that law (8) asks for on what is *believed* and
     all else is true, on the manifold alpha2 = pi/2. With belief equal to truth this is the nominal
     -mu1 cos(alpha1) + v1 f(rho). The h_tilde of the appendix is h_of(truth, believed) - h_of(truth, truth):
     the error of the asked speed over the distance. Off the manifold it enters alpha1 times sin(alpha2), so
-    that its bound holds there too.
+    that its bound holds there too. At another station, on its own manifold, v2_hat counts with the sine of
+    the bearing, by which its law divides.
     """
-    asked = _asked_speed(believed, mu1, spacing)
+    asked = _asked_across(believed, mu1, spacing, station)
     h: FloatArray = (truth.v1 * np.sin(truth.alpha1) + asked) / np.asarray(truth.rho)
     return h
 
 
 def errors_of(
-    perceived: Perceived, truth: SpeedInputs, mu1: float, spacing: Spacing
+    perceived: Perceived, truth: SpeedInputs, mu1: float, spacing: Spacing, station: Station = ABREAST
 ) -> dict[str, FloatArray]:
     """Actual magnitudes of the errors of v1 [m/s], alpha1 [rad, at most pi] and h [rad/s]."""
     believed = SpeedInputs(perceived.rho, perceived.v1, perceived.alpha1)
     return {
         "v1": np.abs(np.asarray(truth.v1) - believed.v1),
         "alpha1": np.abs(wrap(np.asarray(truth.alpha1) - believed.alpha1)),
-        "h": np.abs(h_of(truth, believed, mu1, spacing) - h_of(truth, truth, mu1, spacing)),
+        "h": np.abs(h_of(truth, believed, mu1, spacing, station) - h_of(truth, truth, mu1, spacing, station)),
     }
 
 
@@ -125,8 +130,9 @@ def check(errors: Mapping[str, Values], bounds: Mapping[str, Values]) -> Verdict
     return Verdict(violations, tightness)
 
 
-def _asked_speed(seen: SpeedInputs, mu1: float, spacing: Spacing) -> FloatArray:
-    """Follower speed v2 [m/s] that Eq. (8) of the paper asks for."""
+def _asked_across(seen: SpeedInputs, mu1: float, spacing: Spacing, station: Station) -> FloatArray:
+    """Part across the line [m/s] of the follower speed that Eq. (8) of the paper asks for: v2 sin(alpha2)."""
     rho, v1 = np.asarray(seen.rho), np.asarray(seen.v1)
-    speed: FloatArray = -v1 * np.sin(seen.alpha1) + rho * (-mu1 * np.cos(seen.alpha1) + v1 * spacing.f(rho))
-    return speed
+    off = np.cos(seen.alpha1 + station.to_abreast)
+    across: FloatArray = -v1 * np.sin(seen.alpha1) + rho * (-mu1 * off + station.sign * v1 * spacing.f(rho))
+    return across

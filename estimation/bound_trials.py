@@ -11,16 +11,18 @@ from estimation.bound_check import SpeedInputs, Verdict, all_bounds, check, erro
 from estimation.bounds import InputErrors, Perceived, RateErrors
 from formation.angles import FloatArray
 from formation.spacing import Spacing
+from formation.station import ABREAST, Station
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """Gain mu1 and spacing of an experiment, its leader's speed v1, and the floor v_eps assumed of it."""
+    """Gain mu1 and spacing of an experiment, its leader's speed v1 and floor v_eps, and the station."""
 
     mu1: float
     spacing: Spacing
     v1: float
     v_eps: float
+    station: Station = ABREAST
 
 
 FIG2 = Setting(1.0, Spacing(0.5, 2.0), 0.5, 0.4)
@@ -83,5 +85,6 @@ def judge_trials(
         v_eps=setting.v_eps,
         mu1=setting.mu1,
         spacing=setting.spacing,
+        station=setting.station,
     )
-    return check(errors_of(perceived, truth, setting.mu1, setting.spacing), bounds)
+    return check(errors_of(perceived, truth, setting.mu1, setting.spacing, setting.station), bounds)

@@ -6,8 +6,8 @@ admits errors of the follower's own quantities (rho, alpha2, v2, u2), which ever
 All three speak of the estimate built as in the appendix: with X = -rho_dot - v2 cos(alpha2) and
 Y = rho (alpha2_dot + u2) - v2 sin(alpha2), the leader's velocity (X, Y) is v1 (cos(alpha1), sin(alpha1)), and
 the believed v1 and alpha1 are the polar coordinates of the believed (X, Y). The error of h is the one of
-:func:`estimation.bound_check.h_of`. Below, a hat marks what is believed and no hat the truth. Every function
-takes floats or arrays of shape (n,), and no bound shrinks when an error grows.
+:func:`estimation.bound_check.h_of`, for the law at a station. Below, a hat marks what is believed and no hat
+the truth. Every function takes floats or arrays of shape (n,), and no bound shrinks when an error grows.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 
 from formation.angles import FloatArray, wrap
 from formation.spacing import Spacing
+from formation.station import ABREAST, Station
 
 Values = float | FloatArray
 
@@ -154,24 +155,36 @@ def paper_h(perceived: Perceived, rates: RateErrors, mu1: float, spacing: Spacin
 
 
 def sound_h(
-    perceived: Perceived, rates: RateErrors, v_eps: Values, mu1: float, spacing: Spacing
+    perceived: Perceived,
+    rates: RateErrors,
+    v_eps: Values,
+    mu1: float,
+    spacing: Spacing,
+    station: Station = ABREAST,
 ) -> FloatArray:
     """M_alpha2 + mu1 dev + |f(rho)| M [rad/s], dev the largest change of cos(alpha1) within A.
 
     Law (8) put into the alpha1 dynamics of (5) leaves h_hat - h = (Y - Y_hat)/rho
     - mu1 (cos(alpha1_hat) - cos(alpha1)) + (v1_hat - v1) f(rho), whose first term is the error of alpha2_dot.
+    At another station the law has the sine of the angle by which alpha1 is off in the place of cos(alpha1),
+    and f has the sign of the side.
     """
-    return sound_bounds(perceived, rates, v_eps, mu1, spacing).h
+    return sound_bounds(perceived, rates, v_eps, mu1, spacing, station).h
 
 
 def sound_bounds(
-    perceived: Perceived, rates: RateErrors, v_eps: Values, mu1: float, spacing: Spacing
+    perceived: Perceived,
+    rates: RateErrors,
+    v_eps: Values,
+    mu1: float,
+    spacing: Spacing,
+    station: Station = ABREAST,
 ) -> Bounds:
     """:func:`sound_v1`, :func:`sound_alpha1` and :func:`sound_h` at once: each builds on the one before."""
     v1 = sound_v1(perceived, rates)
     alpha1 = _subtended(v1, perceived.v1, v_eps)
     f = np.abs(spacing.f(np.asarray(perceived.rho)))
-    change = cosine_change(perceived.alpha1, alpha1)
+    change = cosine_change(perceived.alpha1 + station.to_abreast, alpha1)
     return Bounds(v1, alpha1, rates.M_alpha2 + mu1 * change + f * v1)
 
 
@@ -182,6 +195,7 @@ def extended_h(
     v_eps: Values,
     mu1: float,
     spacing: Spacing,
+    station: Station = ABREAST,
 ) -> FloatArray:
     """Bound of h_hat - h [rad/s] when rho, alpha2, v2, u2 carry errors too; infinite for E_rho >= rho_hat.
 
@@ -195,7 +209,7 @@ def extended_h(
     * v1_hat f(rho_hat) rho_hat/rho - v1 f(rho) = (v1_hat - v1) f(rho) + v1_hat (f(rho_hat) - f(rho))
       + v1_hat f(rho_hat) (rho_hat/rho - 1), where f is largest and changes most at lo or hi because it grows.
     """
-    return extended_bounds(perceived, rates, inputs, v_eps, mu1, spacing).h
+    return extended_bounds(perceived, rates, inputs, v_eps, mu1, spacing, station).h
 
 
 def extended_bounds(
@@ -205,6 +219,7 @@ def extended_bounds(
     v_eps: Values,
     mu1: float,
     spacing: Spacing,
+    station: Station = ABREAST,
 ) -> Bounds:
     """:func:`extended_v1`, :func:`extended_alpha1` and :func:`extended_h` at once."""
     v1 = extended_v1(perceived, rates, inputs)
@@ -217,8 +232,8 @@ def extended_bounds(
 
     turn = np.abs(np.asarray(perceived.alpha2_dot) + perceived.u2)
     line = rates.M_alpha2 + inputs.E_u2 + stretch * turn + _sideways_error(perceived, inputs) / lo
-    change = cosine_change(perceived.alpha1, alpha1)
-    bearing = mu1 * (change + stretch * np.abs(np.cos(perceived.alpha1)))
+    off = perceived.alpha1 + station.to_abreast
+    bearing = mu1 * (cosine_change(off, alpha1) + stretch * np.abs(np.cos(off)))
     largest_f = np.maximum(np.abs(f_lo), np.abs(f_hi))
     f_change = np.maximum(f_hat - f_lo, f_hi - f_hat)
     distance = v1 * largest_f + perceived.v1 * (f_change + stretch * np.abs(f_hat))

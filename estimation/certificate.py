@@ -122,7 +122,7 @@ def _estimates(given: Premises, velocity_error: float) -> Claim:
 
 def _h(given: Premises, velocity_error: float, held: InvariantSet | None) -> Claim:
     rho, alpha1 = _states(given, velocity_error, held)
-    where = "rho_0 and alpha1 = -pi/2" if held is None else "the certified formation"
+    where = "rho_0 and alpha1 at its station" if held is None else "the certified formation"
     paper, sound = _h_bounds(given, velocity_error, rho, alpha1)
     assumes = (*_sources(given), f"v1 >= v_eps = {given.v_eps:g} m/s", f"worst over {where}")
     return Claim({"paper": float(paper.max()), "sound": float(sound.max())}, assumes)

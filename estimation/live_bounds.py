@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from formation.angles import wrap
 from formation.spacing import Spacing
+from formation.station import ABREAST, Station
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,11 +27,12 @@ class ErrorBounds:
 
 @dataclass(frozen=True, slots=True)
 class LawConstants:
-    """What the bounds need of the leader's limits and the law: v_eps [m/s], mu1 [rad/s], spacing."""
+    """What the bounds need of the leader's limits and the law: v_eps [m/s], mu1 [rad/s], spacing, station."""
 
     v_eps: float
     mu1: float
     spacing: Spacing
+    station: Station = ABREAST
 
 
 def live_bounds(
@@ -60,7 +62,8 @@ def live_bounds(
     f_lo, f_hat, f_hi = (law.spacing.f(r) for r in (lo, rho, rho + errors.E_rho))
     sideways = errors.E_v2 + abs(v2) * _cosine_change(alpha2 - 0.5 * math.pi, min(errors.E_alpha2, math.pi))
     line = turn_error + stretch * turn + min(sideways, motion) / lo
-    bearing = law.mu1 * (_cosine_change(alpha1, alpha1_error) + stretch * abs(math.cos(alpha1)))
+    off = alpha1 + law.station.to_abreast
+    bearing = law.mu1 * (_cosine_change(off, alpha1_error) + stretch * abs(math.cos(off)))
     distance = v1_error * max(abs(f_lo), abs(f_hi))
     distance += v1 * (max(f_hat - f_lo, f_hi - f_hat) + stretch * abs(f_hat))
     return v1_error, alpha1_error, line + bearing + distance

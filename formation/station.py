@@ -59,6 +59,14 @@ class Station:
         """Desired bearing [rad] of the follower from the leader."""
         return wrap(self.alpha2 - math.pi)
 
+    @property
+    def to_abreast(self) -> float:
+        """Angle [rad] that turns alpha1 at this station into -pi/2; exactly 0 abreast on the right.
+
+        cos(alpha1 + to_abreast) is the sine of the angle by which alpha1 is off the station.
+        """
+        return ABREAST_ALPHA2 - self.alpha2
+
     def offset(self, alpha1: float) -> float:
         """Angle [rad] by which alpha1 is off its desired value, wrapped."""
         return wrap(alpha1 - self.alpha1)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.bound_check import QUANTITY_OF, ROUNDING, SpeedInputs, check, errors_of
+from estimation.bound_check import QUANTITY_OF, ROUNDING, check
 from formation.angles import FloatArray
-from formation.spacing import Spacing
-from hil.judge.bounds import WorstErrors, actual_errors, assumed_errors, named_bounds
+from hil.judge.bounds import WorstErrors, actual_errors, assumed_errors, bound_errors, named_bounds
 from hil.judge.columns import Columns
 from hil.scenario.schema import Scenario
 
@@ -31,9 +30,7 @@ def judge_assumptions(scenario: Scenario, columns: Columns) -> dict[str, object]
     assumed = assumed_errors(scenario, samples)
     kept = _kept(columns, assumed, known)
     all_kept = np.logical_and.reduce(list(kept.values()))
-    spacing = Spacing(scenario.formation.rho_0, scenario.controller.mu_rho)
-    truth = SpeedInputs(true.rho, true.v1, true.alpha1)
-    errors = errors_of(samples.seen, truth, scenario.controller.mu1, spacing)
+    errors = bound_errors(scenario, columns)
     bounds = named_bounds(scenario, columns, WorstErrors.of(assumed))
     held = {
         name: errors[QUANTITY_OF[name]][known] <= bound[known] + ROUNDING for name, bound in bounds.items()

@@ -13,6 +13,7 @@ from formation.angles import FloatArray, wrap
 from formation.spacing import Spacing
 from hil.certificate import premises_of
 from hil.judge.columns import Columns, EstimateColumns
+from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 from hil.wire.estimate_message import AssumedErrors
 
@@ -67,7 +68,7 @@ def bound_errors(scenario: Scenario, columns: Columns) -> dict[str, FloatArray]:
     """Size of the errors of v1, alpha1 and h at every sample, NaN where the truth is not known."""
     spacing = Spacing(scenario.formation.rho_0, scenario.controller.mu_rho)
     truth = SpeedInputs(columns.true.rho, columns.true.v1, columns.true.alpha1)
-    return errors_of(columns.samples.seen, truth, scenario.controller.mu1, spacing)
+    return errors_of(columns.samples.seen, truth, scenario.controller.mu1, spacing, station(scenario))
 
 
 def named_bounds(scenario: Scenario, columns: Columns, given: WorstErrors) -> dict[str, FloatArray]:
@@ -80,6 +81,7 @@ def named_bounds(scenario: Scenario, columns: Columns, given: WorstErrors) -> di
         v_eps=scenario.leader.v_eps,
         mu1=scenario.controller.mu1,
         spacing=spacing,
+        station=station(scenario),
     )
     n = len(columns.samples.capture_ns)
     return {name: np.broadcast_to(bound, (n,)) for name, bound in bounds.items()}

@@ -16,6 +16,7 @@ from estimation.own_motion import OwnNoise, steady_noise
 from estimation.screening import NO_DOUBT
 from estimation.tracking import Status
 from formation.spacing import Spacing
+from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 from hil.wire.message_types import Consumed, LeaderEstimate
 from hil.wire.messages import header, to_ns, to_time
@@ -58,6 +59,7 @@ class AssumedErrors:
                 leader.v_eps,
                 scenario.controller.mu1,
                 Spacing(scenario.formation.rho_0, scenario.controller.mu_rho),
+                station(scenario),
             ),
         )
 

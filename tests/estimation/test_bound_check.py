@@ -3,6 +3,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,7 +24,8 @@ from estimation.bound_check import (
 from estimation.bound_trials import FIG2, LEVELS, TURTLEBOT3, Setting, judge_trials
 from estimation.bounds import InputErrors, Perceived, RateErrors
 from formation.pose import Motion
-from formation.shape import Shape, reduced_rates, relative_rates
+from formation.shape import Shape, relative_rates, shape_rates
+from formation.station import Side, Station
 
 EXACT_FORMS = {"v1", "alpha1", "h"}
 EXTENDED_FORMS = {"v1_extended", "alpha1_extended", "h_extended"}
@@ -51,7 +53,10 @@ def test_with_exact_inputs_sound_and_extended_hold_tightly_and_the_paper_does_no
     assert verdict.violations["paper_h"] > 0
 
 
-@pytest.mark.parametrize("setting", [FIG2, TURTLEBOT3], ids=["fig2", "turtlebot3"])
+ELSEWHERE = replace(TURTLEBOT3, station=Station(Side.LEFT, 0.7))
+
+
+@pytest.mark.parametrize("setting", [FIG2, TURTLEBOT3, ELSEWHERE], ids=["fig2", "turtlebot3", "left behind"])
 def test_with_input_errors_only_the_extended_form_holds(setting: Setting) -> None:
     verdict = over_all_levels(setting, input_errors=True)
     for name in EXTENDED_FORMS:
@@ -100,14 +105,17 @@ def moments() -> Iterator[SpeedInputs]:
         yield SpeedInputs(rho, v1, alpha1)
 
 
-def test_h_is_the_alpha1_dynamics_under_the_published_law() -> None:
-    gains = Gains(TURTLEBOT3.mu1, 2.0, TURTLEBOT3.spacing)
+@pytest.mark.parametrize("side", Side)
+@pytest.mark.parametrize("bearing", [0.7, math.pi / 2, 2.0])
+def test_h_is_the_alpha1_dynamics_under_the_published_law(side: Side, bearing: float) -> None:
+    station = Station(side, bearing)
+    gains = Gains(TURTLEBOT3.mu1, 2.0, TURTLEBOT3.spacing, station)
     for truth, believed in zip(moments(), reversed(list(moments())), strict=True):
         rho, v1, alpha1 = float(believed.rho), float(believed.v1), float(believed.alpha1)
-        asked = independent_speed(Shape(rho, alpha1, math.pi / 2), v1, gains)
-        leader = Motion(float(truth.v1), 0.0)
-        _, alpha1_dot = reduced_rates(float(truth.rho), float(truth.alpha1), leader, asked)
-        assert h_of(truth, believed, gains.mu1, gains.spacing) == pytest.approx(alpha1_dot, rel=1e-12)
+        asked = independent_speed(Shape(rho, alpha1, station.alpha2), v1, gains)
+        true_shape = Shape(float(truth.rho), float(truth.alpha1), station.alpha2)
+        alpha1_dot = shape_rates(true_shape, Motion(float(truth.v1), 0.0), Motion(asked, 0.0)).alpha1_dot
+        assert h_of(truth, believed, gains.mu1, gains.spacing, station) == pytest.approx(alpha1_dot, rel=1e-9)
 
 
 def test_the_extended_bound_of_h_is_reached_where_all_its_parts_add_up() -> None:
