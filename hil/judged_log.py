@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import fcntl
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +24,20 @@ def made_folder(folder: Path) -> Path:
     except OSError as error:
         raise UsageError(f"--out {folder}: cannot be made ({error.strerror}); give another folder") from None
     return folder
+
+
+@contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """Keep other runs out of a folder; raises :class:`UsageError` if one is going on in it."""
+    held = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise UsageError(f"--out {folder}: another run is going on there; give another folder") from None
+        yield
+    finally:
+        os.close(held)
 
 
 def judge_log(log: Log, folder: Path) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import click
 
 from hil.commands.seconds import DURATION
 from hil.errors import CheckFailedError, UsageError
-from hil.judged_log import judge_log, made_folder
+from hil.judged_log import claimed, judge_log, made_folder
 from hil.report_json import print_json
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario, refuse_unrunnable
@@ -60,6 +60,11 @@ def command(
     refuse_unrunnable(chosen)
     links_of(chosen)
     folder = _folder(chosen, out)
+    with claimed(folder):
+        _run(chosen, folder, listen, lockstep=lockstep, as_json=as_json)
+
+
+def _run(chosen: Scenario, folder: Path, listen: str | None, *, lockstep: bool, as_json: bool) -> None:
     log_path = folder / "run.mcap"
     if log_path.exists():
         raise UsageError(f"{log_path} exists already; give another --out, or move it away")

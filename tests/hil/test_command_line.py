@@ -13,6 +13,7 @@ import pytest
 from hil.command_line import COMMANDS, main
 from hil.errors import UsageError
 from hil.judge.evidence import evidence_of_log
+from hil.judged_log import claimed
 from hil.log.reader import Log, read_log
 from hil.nodes.lockstep_run import run_lockstep
 from hil.scenario.checked_toml import data_folder
@@ -122,6 +123,14 @@ def test_a_name_that_is_no_text_is_written_as_far_as_it_is(tmp_path: Path, short
     facts = evidence_of_log(read_log(log)).log
     assert facts is not None
     assert facts.path == f"{tmp_path}/run?.mcap"
+
+
+def test_two_runs_do_not_write_into_one_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with claimed(tmp_path):
+        for how in (["--lockstep"], []):
+            assert main_code(["run", *how, "--duration", "0.3", "--out", str(tmp_path)]) == 2
+            assert "another run" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_full_disk_is_told_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
