@@ -20,7 +20,8 @@ from estimation.motion import Matrix, Vector
 from formation.angles import FloatArray
 
 EARLIEST, LATEST = -0.2, 0.6
-"""Delays [s] that are tried. One below zero shows a measurement that is stamped too early."""
+"""Delays [s] that are tried. One below zero shows a measurement that is stamped too early, and is taken only
+where it fits clearly better than any other."""
 
 LONGEST_LAG = 1.0
 """Lags up to this [s] are tried."""
@@ -34,10 +35,12 @@ LARGEST_SD = 0.02
 _GRID = 0.02  # of delays [s]
 _LAGS = (0.005, 0.03, 0.06, 0.1, 0.15, 0.25, 0.4, 0.7)
 _STEP = 1e-3  # for the slopes by delay and lag [s]
+_JUMPY = 0.01  # a lag below this [s] answers in jumps, and no sample notices a short step
 _SHORTEST_LAG = 1e-6
 _STILL = 1.0  # a robot that was told to stand for longer [s] tells nothing
 _LEAST_SCALE = 1e-5  # [m/s], [rad/s]: no odometry is finer
 _BLOCKS, _BLOCK = 8, 1.0  # errors of one block, of this length [s] or longer, may be alike
+_CLEARLY = 10.0  # by which the loss has to fall
 _FAR = 4.0  # scales off the fit: an outlier
 
 
@@ -81,7 +84,12 @@ def fit_response(
         return None
     answers = _Answers(command_times, told, times)
     start, scales = _nearest(answers, measured)
-    return _Fit(answers, measured, scales).refined(start)
+    coarse = _Fit(answers, measured, scales)
+    p = coarse.solved(np.array([*start, 1.0, 0.0, 1.0, 0.0]), EARLIEST)
+    # Off the grid residuals may spread far less, and what is far off is told by that.
+    fine = _Fit(answers, measured, _spread(coarse.off(p).reshape(2, -1).T * scales))
+    causal, free = fine.solved(np.maximum(p, [0.0, 0.0, *[-np.inf] * 4]), 0.0), fine.solved(p, EARLIEST)
+    return fine.response(free if fine.loss(free) < fine.loss(causal) - _CLEARLY else causal)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,19 +131,24 @@ class _Fit:
     measured: Matrix
     scales: Vector
 
-    def refined(self, start: tuple[float, float]) -> ActuatorResponse | None:
-        """Fit from a delay and a lag near the best ones."""
+    def solved(self, start: Vector, earliest: float) -> Vector:
+        """The six that fit best, from a start near them, with no delay below the earliest one."""
         from scipy.optimize import least_squares  # a third of a second, for those only who fit
 
         found = least_squares(
-            self._off,
-            np.array([*start, 1.0, 0.0, 1.0, 0.0]),
+            self.off,
+            start,
             self._slopes,
-            bounds=([EARLIEST, 0.0, *[-np.inf] * 4], [LATEST, LONGEST_LAG, *[np.inf] * 4]),
+            bounds=([earliest, 0.0, *[-np.inf] * 4], [LATEST, LONGEST_LAG, *[np.inf] * 4]),
             x_scale=[0.01, 0.01, 0.1, 0.01, 0.1, 0.01],
             loss="soft_l1",
         )
-        p, off = found.x, self._off(found.x)
+        p: FloatArray = found.x
+        return p
+
+    def response(self, p: Vector) -> ActuatorResponse | None:
+        """What six that fit best mean, with their standard deviations; None if that is nothing."""
+        off = self.off(p)
         covariance = self._covariance(p, off)
         inside = EARLIEST + _GRID < p[0] < LATEST - _GRID and p[1] < LONGEST_LAG - _GRID
         if covariance is None or not inside:
@@ -149,23 +162,28 @@ class _Fit:
         outliers = int(np.count_nonzero(np.any(np.abs(off.reshape(2, -1)) > _FAR, axis=0)))
         return ActuatorResponse(transport, lag, delay, gain_v, gain_u, len(self.measured), outliers)
 
-    def _off(self, p: Vector) -> FloatArray:
+    def loss(self, p: Vector) -> float:
+        """What is made least."""
+        return float(np.sum(np.sqrt(1.0 + self.off(p) ** 2) - 1.0))
+
+    def off(self, p: Vector) -> FloatArray:
         """Residuals (2 n,) of v, then of u, in scales."""
         fitted = self.answers.of(p[0], p[1]) * p[[2, 4]] + p[[3, 5]]
         return ((fitted - self.measured) / self.scales).T.ravel()
 
     def _slopes(self, p: Vector) -> FloatArray:
-        """Slopes (2 n, 6) of the residuals; those by delay and lag by differences over a millisecond."""
+        """Slopes (2 n, 6) of the residuals; those by delay and lag by differences."""
         delay, lag = float(p[0]), float(p[1])
         answers, states = self.answers, self.answers.states(lag)
-        late, early = (answers.seen(states, delay + side * _STEP, lag) for side in (1.0, -1.0))
-        least = max(lag - _STEP, 0.0)
-        slow, fast = answers.of(delay, lag + _STEP), answers.of(delay, least)
+        step = _STEP if lag > _JUMPY else _JUMPY
+        late, early = (answers.seen(states, delay + side * step, lag) for side in (1.0, -1.0))
+        least = max(lag - step, 0.0)
+        slow, fast = answers.of(delay, lag + step), answers.of(delay, least)
         plain, ones, zeros = answers.seen(states, delay, lag), np.ones(len(late)), np.zeros(len(late))
         slopes = []
         for k, (gain, scale) in enumerate(zip((p[2], p[4]), self.scales.tolist(), strict=True)):
-            by_delay = gain * (late - early)[:, k] / (2.0 * _STEP)
-            by_lag = gain * (slow - fast)[:, k] / (lag + _STEP - least)
+            by_delay = gain * (late - early)[:, k] / (2.0 * step)
+            by_lag = gain * (slow - fast)[:, k] / (lag + step - least)
             own, other = [plain[:, k], ones], [zeros, zeros]
             columns = [by_delay, by_lag, *own, *other] if k == 0 else [by_delay, by_lag, *other, *own]
             slopes.append(np.column_stack(columns) / scale)
@@ -200,6 +218,12 @@ def _telling(command_times: Vector, told: NDArray[np.complex128], times: Vector)
     return telling
 
 
+def _spread(off: Matrix) -> FloatArray:
+    """Standard deviations (2,) of residuals (n, 2) by their median absolute deviations."""
+    spread: FloatArray = 1.4826 * np.median(np.abs(off - np.median(off, axis=0)), axis=0)
+    return np.maximum(spread, _LEAST_SCALE)
+
+
 def _nearest(answers: _Answers, measured: Matrix) -> tuple[tuple[float, float], Vector]:
     """Delay and lag of the grid with the least median residuals, and the scales (2,) of these."""
     best, start, scales = math.inf, (0.0, 0.0), np.ones(2)
@@ -207,8 +231,7 @@ def _nearest(answers: _Answers, measured: Matrix) -> tuple[tuple[float, float], 
         states = answers.states(lag)
         for delay in np.arange(EARLIEST, LATEST + 0.5 * _GRID, _GRID).tolist():
             off = measured - answers.seen(states, delay, lag)
-            spread = np.median(np.abs(off - np.median(off, axis=0)), axis=0)
-            spread = np.maximum(1.4826 * spread, _LEAST_SCALE)
+            spread = _spread(off)
             if (score := float(np.log(spread).sum())) < best:
                 best, start, scales = score, (delay, lag), spread
     return start, scales
