@@ -21,6 +21,8 @@ from hil.sweep.engine_rules import KINDS, refuse_unknown
 
 SHORTEST_S = 1.0
 """Shortest run that a sweep takes: the judge looks at its second half."""
+LONGEST_S = 3600.0
+"""Longest one: a run is kept in memory as a whole until it is judged."""
 
 
 class Grid(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -42,7 +44,7 @@ class SweepSpec(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     scenario: str = "turtlebot3"
     runs: Annotated[int, Meta(ge=1)] = 100
     seed: Annotated[int, Meta(ge=0, le=2**62)] = 1
-    duration_s: Annotated[float, Meta(ge=SHORTEST_S)] = 30.0
+    duration_s: Annotated[float, Meta(ge=SHORTEST_S, le=LONGEST_S)] = 30.0
     estimators: Annotated[tuple[str, ...], Meta(min_length=1)] = ("ekf",)
     set: tuple[str, ...] = ()
     grid: Grid

@@ -46,6 +46,7 @@ def test_seeds_of_runs_depend_on_sweep_and_number_only() -> None:
         (SMALL.replace('"difference"', '"imm"'), "imm"),
         (SMALL.replace("max_age_s=0.4", "max_edge_s=0.4"), "max_age_s"),
         (SMALL.replace("controller.max_age_s=0.4", "mocap.jitter_s=0.01"), "jitter_s"),
+        (SMALL.replace("duration_s = 5.0", "duration_s = 1e9"), "duration_s is 1000000000.0"),
     ],
 )
 def test_a_mistake_is_answered_by_one_line(make_sweep: Callable[..., Sweep], text: str, message: str) -> None:
