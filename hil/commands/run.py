@@ -71,15 +71,18 @@ def _run(chosen: Scenario, folder: Path, listen: str | None, *, lockstep: bool, 
     failure = _lockstep(chosen, log_path) if lockstep else _live(chosen, folder, log_path, listen)
     if not log_path.exists():
         raise CheckFailedError(failure or "interrupted before anything was recorded")
-    if not lockstep:
-        _make_whole(log_path)
-    summary = _judge(log_path, folder)
-    if as_json:
-        print_json(summary)
-    if failure:
-        raise CheckFailedError(
-            f"the run broke down: {failure}; the robots were stopped, the log is {log_path}"
-        )
+    try:
+        if not lockstep:
+            _make_whole(log_path)
+        summary = _judge(log_path, folder)
+        if as_json:
+            print_json(summary)
+    finally:
+        # Also if there is no room for a verdict, say: what went wrong first is what to tell.
+        if failure:
+            raise CheckFailedError(
+                f"the run broke down: {failure}; the robots were stopped, the log is {log_path}"
+            )
 
 
 def _folder(scenario: Scenario, out: Path | None) -> Path:

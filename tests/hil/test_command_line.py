@@ -18,6 +18,7 @@ from hil.log.reader import Log, read_log
 from hil.nodes.lockstep_run import run_lockstep
 from hil.scenario.checked_toml import data_folder
 from hil.scenario.files import load_scenario
+from hil.scenario.schema import Scenario
 
 
 def abreast(*arguments: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
@@ -144,3 +145,16 @@ def main_code(arguments: list[str]) -> object:
     with pytest.raises(SystemExit) as ended:
         main(arguments)
     return ended.value.code
+
+
+def test_a_run_that_broke_down_says_so_even_without_room_for_a_verdict(
+    tmp_path: Path, short_log: Log, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(_scenario: Scenario, _folder: Path, log_path: Path, _listen: str | None) -> str:
+        log_path.write_bytes(short_log.path.read_bytes())
+        return "the recorder ended"
+
+    monkeypatch.setattr("hil.commands.run._live", broken)
+    (tmp_path / "summary.json").symlink_to("/dev/full")
+    assert main_code(["run", "--out", str(tmp_path)]) == 1
+    assert "the run broke down: the recorder ended" in capsys.readouterr().err.splitlines()[-1]
