@@ -47,7 +47,9 @@ class ChunkedMcap:
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
         self._metadata_indexes: list[MetadataIndex] = []
-        self._chunk_indexes: list[ChunkIndex] = []
+        # As bytes, since a run of hours has ten a second.
+        self._chunk_indexes = bytearray()
+        self._chunks = 0
         self._message_counts: dict[int, int] = {}
         self._span: tuple[int, int] | None = None
         self._chunk = bytearray()
@@ -137,7 +139,8 @@ class ChunkedMcap:
             message_index_offsets=index_offsets,
             message_index_length=len(written) - chunk_bytes,
         )
-        self._chunk_indexes.append(index)
+        self._chunk_indexes += _bytes_of([index])
+        self._chunks += 1
         self._emit(written)
 
     def finish(self) -> None:
@@ -149,7 +152,7 @@ class ChunkedMcap:
             (Opcode.SCHEMA, _bytes_of(self._schemas)),
             (Opcode.CHANNEL, _bytes_of(self._channels)),
             (Opcode.STATISTICS, _bytes_of([self._statistics()])),
-            (Opcode.CHUNK_INDEX, _bytes_of(self._chunk_indexes)),
+            (Opcode.CHUNK_INDEX, bytes(self._chunk_indexes)),
             (Opcode.METADATA_INDEX, _bytes_of(self._metadata_indexes)),
         ]
         offsets: list[SummaryOffset] = []
@@ -172,7 +175,7 @@ class ChunkedMcap:
             attachment_count=0,
             channel_count=len(self._channels),
             channel_message_counts={number: count for number, count in self._message_counts.items() if count},
-            chunk_count=len(self._chunk_indexes),
+            chunk_count=self._chunks,
             message_count=sum(self._message_counts.values()),
             message_start_time=first,
             message_end_time=last,

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from hil.errors import AbreastError, UsageError
+from hil.log.reader import read_log
 from hil.log.recovery import recover
 from hil.log.writer import LogWriter
 from hil.wire.message_types import Message, RangeBearing
@@ -204,3 +206,18 @@ def test_a_full_disk_is_one_clear_error_and_keeps_what_was_written(tmp_path: Pat
 def test_an_unknown_type_is_refused_when_it_is_written(tmp_path: Path) -> None:
     with LogWriter(tmp_path / "run.mcap", {}) as log, pytest.raises(UsageError, match="foo_msgs/msg/Bar"):
         log.write("a", "foo_msgs/msg/Bar", b"", START_NS, START_NS)
+
+
+def test_a_long_run_takes_little_memory_for_the_index_of_its_log(tmp_path: Path) -> None:
+    payload = sight(1)
+    with LogWriter(tmp_path / "long.mcap", {}) as log:
+        held: list[int] = []
+        tracemalloc.start()
+        for chunk in range(600):
+            for topic in "abcdefgh":
+                log.write(topic, TYPENAME, payload, chunk, chunk)
+            log.flush()
+            held.append(tracemalloc.get_traced_memory()[0])
+        tracemalloc.stop()
+    assert held[-1] - held[100] < 500 * 400
+    assert read_log(tmp_path / "long.mcap").messages == 4800
