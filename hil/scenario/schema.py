@@ -107,10 +107,13 @@ class ImpulseProgram(_Section, frozen=True, kw_only=True, tag="impulse", tag_fie
 
 
 class TableProgram(_Section, frozen=True, kw_only=True, tag="table", tag_field="kind"):
-    """Speed v and turn rate u at the times t, linear in between and held at the ends."""
+    """Speed v and turn rate u at the times t, linear in between and held at the ends.
+
+    No leader drives backwards: of who is seen by its positions the direction of motion is the heading.
+    """
 
     t: list[float]
-    v: list[float]
+    v: list[NonNegative]
     u: list[float]
 
 
