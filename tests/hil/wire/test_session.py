@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import time
 from pathlib import Path
 
@@ -41,6 +42,13 @@ def test_what_one_client_publishes_another_receives_in_order() -> None:
             wire.close()
         for session in reversed(sessions):
             close_session(session)
+
+
+def test_a_reserved_port_is_given_to_nobody_else() -> None:
+    with reserved_endpoint() as endpoint, socket.socket() as other:
+        host, _, port = endpoint.removeprefix("tcp/").partition(":")
+        with pytest.raises(OSError, match="in use"):
+            other.bind((host, int(port)))
 
 
 def test_nobody_at_the_endpoint_is_said_with_its_name() -> None:
