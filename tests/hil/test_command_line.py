@@ -23,7 +23,7 @@ from hil.scenario.schema import Scenario
 
 def abreast(*arguments: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "hil", *arguments], capture_output=True, text=True, cwd=folder, timeout=300
+        [sys.executable, "-m", "hil", *arguments], capture_output=True, text=True, cwd=folder
     )
 
 
