@@ -108,6 +108,9 @@ class ControllerNode:
         self, state: ControllerState, event: Event, now_ns: int
     ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
         """Take in an estimate, a stop or a tick; each leads to a command."""
+        if now_ns < state.commanded_ns:
+            # The clock was set back: what is known would count as new again when it gets there once more.
+            state = replace(state, estimate=None, trend=None, sent=())
         if event.topic:
             state = replace(state, receipts=(*state.receipts, consumed(event, now_ns)))
         fresh = False
@@ -215,11 +218,8 @@ class ControllerNode:
     ) -> tuple[SentCommand, ...]:
         """Commands that a prediction may still need: the one that acts at its begin, and later ones.
 
-        None begins before the capture of the estimate, or more than the largest age ago. Those that seem to
-        act after the newest are of a clock that was set back since.
+        None begins before the capture of the estimate, or more than the largest age ago.
         """
-        if len(sent) > 1 and sent[-2].from_ns > sent[-1].from_ns:
-            sent = sent[-1:]
         if estimate is None:
             return sent[-1:]
         begin_ns = max(estimate.capture_ns, now_ns - round(self.max_age / _NS))
