@@ -49,12 +49,14 @@ class Parity:
     """How many outputs were compared, how many differ in any bit, and the place of the first that does.
 
     ``unrecorded``: messages that went out beside them and are not in the log: nobody can compare them.
+    ``gap_s``: for how long before the first that differs no output was recorded.
     """
 
     compared: int
     mismatched: int
     first: int | None = None
     unrecorded: int = 0
+    gap_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +164,8 @@ def parity_of(repeated: Sequence[Repeated], topic: str, beside: Mapping[str, Seq
         differing, missed = _compare_in_order(sent, logged)
         wrong |= differing
         unrecorded += missed
-    return Parity(len(repeated), len(wrong), min(wrong, default=None), unrecorded)
+    first = min(wrong, default=None)
+    return Parity(len(repeated), len(wrong), first, unrecorded, _gap_before(repeated, first))
 
 
 def parity_beside(outputs: Iterable[Outgoing], topic: str, logged: Sequence[bytes]) -> Parity:
@@ -209,6 +212,13 @@ def _compare_in_order(sent: Sequence[tuple[int, int]], logged: Sequence[int]) ->
         elif place not in differing:
             missed += 1
     return differing, missed
+
+
+def _gap_before(repeated: Sequence[Repeated], place: int | None) -> float:
+    if not place:
+        return 0.0
+    before, after = (step.recorded.computed_ns for step in repeated[place - 1 : place + 1])
+    return 0.0 if before is None or after is None else (after - before) * 1e-9
 
 
 def _agrees(step: Repeated, topic: str) -> bool:

@@ -19,6 +19,7 @@ from hil.scenario.schema import Scenario
 from hil.wire.message_types import LeaderEstimate
 from hil.wire.messages import to_ns
 
+_LONG_GAP_S = 0.5
 _CALLED = {"certified": "certified estimates"}
 
 
@@ -110,6 +111,10 @@ def why_not_same(log: Log, played: Replay) -> str:
     if not wrong:
         return ""
     lost = f"{played.missing_inputs} inputs are missing in the log" if played.missing_inputs else ""
+    gap_s = max(parity.gap_s for parity in played.parity.values())
+    if gap_s > _LONG_GAP_S:
+        # Whatever was consumed in the meantime, its receipts went by too.
+        lost = lost or f"the log has nothing of {gap_s:.1f} s before: nobody can repeat what it misses"
     doubt = "did every daemon run with the recorder's scenario, and with this version of abreast?"
     return f"log {log.path}: {', '.join(wrong)}; {lost or doubt}"
 

@@ -14,6 +14,7 @@ from hil.nodes.lockstep import EPOCH_NS
 from hil.nodes.lockstep_run import run_lockstep
 from hil.replay.journal import Parity
 from hil.replay.rerun import Replay, replay
+from hil.replay.verdict import why_not_same
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario, with_overrides
 from hil.wire import topics
@@ -244,3 +245,14 @@ def test_a_log_of_another_make_is_sent_for_a_map(tmp_path: Path) -> None:
         log.write("odom", "nav_msgs/msg/Odometry", b"", EPOCH_NS, EPOCH_NS)
     with pytest.raises(UsageError, match=r"name its topics with --map FILE \(topics there: odom\)"):
         replay(read_log(tmp_path / "other.mcap"))
+
+
+def test_a_gap_in_the_log_is_told_where_it_is_why_outputs_differ(rough_log: Log, tmp_path: Path) -> None:
+    assert rough_log.end_ns is not None
+    middle_ns = rough_log.end_ns - 3 * 10**9
+
+    def cut(record: Record) -> Record | None:
+        return None if 0 <= record.log_ns - middle_ns < 10**9 else record
+
+    log = rewritten(rough_log, tmp_path / "gap.mcap", cut)
+    assert "the log has nothing of 1.0 s before" in why_not_same(log, replay(log))
