@@ -182,6 +182,8 @@ class EstimatorNode:
             raise RefusedError("bad_range")
         if given.sensor_x or given.sensor_y:
             rho, alpha2 = from_sensor(rho, alpha2, (given.sensor_x, given.sensor_y))
+        if rho < _SAME_PLACE:
+            raise RefusedError("same_place")
         measurement = measure_body(
             sighting.capture_ns, rho, alpha2, given.sigma_range, given.sigma_bearing, motion
         )

@@ -215,6 +215,20 @@ def test_frames_twice_late_and_too_late_are_told_apart() -> None:
     assert (state.taken["used"], state.taken["late"]) == (59, 2)
 
 
+@pytest.mark.parametrize(("ahead", "rho"), [(0.0, 1e-9), (0.0, 1e-200), (-0.03125, 0.03125)])
+def test_a_leader_sighted_in_the_follower_s_own_place_is_refused(ahead: float, rho: float) -> None:
+    """It would have no bearing, and a position without variance, which not every filter survives."""
+    changes = ["estimator.kind=ukf-filterpy", "estimator.front_end=body", f"estimator.sensor_x={ahead}"]
+    node = EstimatorNode(load_scenario("turtlebot3", changes))
+    state = node.begin(EPOCH_NS)
+    for number in range(4):
+        now_ns = EPOCH_NS + number * FRAME_NS
+        sighting = encode(msg.RangeBearing(header(now_ns, "follower"), rho, 0.0))
+        state, _ = node.step(state, Event(node.topics.sighting, sighting), now_ns)
+    assert state.refused == {"same_place": 4}
+    assert not state.track
+
+
 def test_a_sighting_needs_the_body_front_end() -> None:
     sighting = encode(msg.RangeBearing(header(EPOCH_NS, "follower"), 0.4, 1.5))
     event = (EPOCH_NS, Event(NODE.topics.sighting, sighting))
