@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-_LONGEST = 1e9
+_LONGEST = 1e10  # recordings may count from 1970
 
 
 class Seconds(click.FloatRange):

@@ -158,3 +158,8 @@ def test_a_run_that_broke_down_says_so_even_without_room_for_a_verdict(
     (tmp_path / "summary.json").symlink_to("/dev/full")
     assert main_code(["run", "--out", str(tmp_path)]) == 1
     assert "the run broke down: the recorder ended" in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_times_of_a_recording_may_count_from_1970(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main_code(["replay", "no_such.mcap", "--from", "1767225600.5", "--to", "1767225700"]) == 2
+    assert "no such file" in capsys.readouterr().err
