@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 import msgspec
 
 from hil.commands.seconds import DURATION
 from hil.errors import UsageError
-from hil.report_json import print_json
+from hil.report_json import known, print_json
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
 
@@ -44,8 +45,8 @@ def command(
     if as_json:
         print_json(result)
         return
-    for key, value in result.items():
-        click.echo(f"{key}: {value}", err=True)
+    for key, value in known(result).items():
+        click.echo(f"{key}: {_told(value)}", err=True)
     if out is not None:
         click.echo(f"pictures and trajectory.csv are in {out}", err=True)
 
@@ -69,6 +70,26 @@ def _simulate(scenario: Scenario, out: Path | None, *, stability: bool) -> dict[
     from hil.simulation import simulate
 
     return simulate(scenario, out, stability=stability)
+
+
+def _told(value: Any) -> str:
+    """A result for who reads it: six digits, and of a long list its length and range."""
+    match value:
+        case dict():
+            return ", ".join(
+                f"{key} ({_told(item)})" if isinstance(item, dict) else f"{key} {_told(item)}"
+                for key, item in value.items()
+            )
+        case [first, _, _, *_, last] if isinstance(first, float):
+            return f"{len(value)} from {_told(first)} to {_told(last)}"
+        case list():
+            separator = "; " if any(isinstance(item, dict) for item in value) else " to "
+            return separator.join(map(_told, value))
+        case bool():
+            return "yes" if value else "no"
+        case float():
+            return f"{value:.6g}"
+    return str(value)
 
 
 def _refuse_what_is_for_a_pair(scenario: Scenario, section: str, *, stability: bool) -> None:

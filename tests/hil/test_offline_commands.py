@@ -90,6 +90,14 @@ def rows(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(stream))
 
 
+def test_a_simulation_is_told_in_words_and_six_digits(abreast: Any) -> None:
+    said = abreast("simulate", "chain5", "--duration", "1")
+    assert said.code == 0
+    assert not said.out
+    assert "recovered: yes\npairs: rho_final 0.5, settle_s 0, v_peak" in said.err
+    assert not set("[]{}'") & set(said.err)
+
+
 def test_verify_repeats_a_run_and_says_so(abreast: Any, run_log: Path, tmp_path: Path) -> None:
     said = abreast("replay", run_log, "--verify", "--strict", "--json", "--out", tmp_path / "out")
     assert said.code == 0
