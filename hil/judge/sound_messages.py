@@ -4,21 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
+from estimation.estimate import QUANTITIES
 from estimation.tracking import Status
 from hil.wire.message_types import Command, LeaderEstimate, Message, Time
 from hil.wire.messages import MalformedPayloadError, to_ns
 
+_LARGEST = 1e12
+
 
 def is_sound(message: Message) -> bool:
-    """Whether every stamp of a message is a time, and its status one that exists."""
+    """Whether every stamp of a message is a time, its status one that exists, and its numbers can be."""
     try:
         for stamp in _stamps(message):
             to_ns(stamp)
         if isinstance(message, LeaderEstimate):
             Status(message.status)
+            return _can_be(message)
     except (MalformedPayloadError, ValueError):
         return False
     return True
+
+
+def _can_be(estimate: LeaderEstimate) -> bool:
+    """Whether an estimate's numbers are such as a sound estimator gives; deviations may be unknown (NaN)."""
+    numbers = [getattr(estimate, name) for name in (*QUANTITIES, "rho", "alpha2", "v2", "u2")]
+    variances = estimate.covariance[~np.isnan(estimate.covariance)]
+    return all(abs(number) < _LARGEST for number in numbers) and bool(np.all(np.abs(variances) < _LARGEST))
 
 
 def _stamps(message: Message) -> Iterator[Time]:

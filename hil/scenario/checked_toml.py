@@ -17,6 +17,9 @@ from hil.errors import UsageError
 
 T = TypeVar("T", bound=msgspec.Struct)
 
+LARGEST = 1e12
+"""No number of a lab is above this, and squares of larger ones lose their meaning."""
+
 _UNKNOWN = re.compile(r"unknown field `(?P<key>[^`]*)`(?: - at `\$\.?(?P<path>[^`]*)`)?")
 _AT = re.compile(r"^(?P<what>.*?)(?: - at `\$\.?(?P<path>[^`]*)`)?$", re.DOTALL)
 
@@ -61,11 +64,14 @@ def checked(tree: Mapping[str, Any], kind: type[T], source: str) -> T:
     """Turn a tree of plain values into a struct of the given kind.
 
     Raises :class:`UsageError`, beginning with ``source``, for an unknown key (naming the nearest known one),
-    a wrong type, a value out of range or a number that isn't finite.
+    a wrong type, a value out of range or a number that isn't finite or above :data:`LARGEST`.
     """
     try:
-        _refuse_non_finite(tree, source, "")
-        return msgspec.convert(tree, kind)
+        _refuse_above(math.inf, tree, source, "")
+        result = msgspec.convert(tree, kind)
+        # Only now, as a key's own range says more.
+        _refuse_above(LARGEST, tree, source, "")
+        return result
     except RecursionError:
         raise UsageError(f"{source}: sections nested too deeply; leave out what does not belong") from None
     except msgspec.ValidationError as error:
@@ -79,15 +85,17 @@ def nearest(word: str, known: Iterable[str]) -> str:
     return f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(names)}"
 
 
-def _refuse_non_finite(node: object, source: str, path: str) -> None:
+def _refuse_above(largest: float, node: object, source: str, path: str) -> None:
     if isinstance(node, Mapping):
         for key, value in node.items():
-            _refuse_non_finite(value, source, f"{path}.{key}" if path else str(key))
+            _refuse_above(largest, value, source, f"{path}.{key}" if path else str(key))
     elif isinstance(node, Sequence) and not isinstance(node, str):
         for value in node:
-            _refuse_non_finite(value, source, path)
+            _refuse_above(largest, value, source, path)
     elif isinstance(node, float) and not math.isfinite(node):
         raise UsageError(f"{source}: {path} is {node}, expected a finite number")
+    elif isinstance(node, float) and abs(node) > largest:
+        raise UsageError(f"{source}: {path} is {node:g}, expected a number up to {largest:g}")
 
 
 def _explain(error: str, tree: Mapping[str, Any], kind: type[msgspec.Struct]) -> str:

@@ -73,7 +73,7 @@ class ControllerSection(_Section, frozen=True, kw_only=True):
     v_max: Positive = 0.22
     u_max: Positive = 2.84
     max_age_s: Positive = 0.2
-    lag_s: NonNegative = 0.1
+    lag_s: Span = 0.1
     transport_s: Span = 0.0
     tick_hz: Rate = 50.0
     v_resolution: NonNegative = 0.0

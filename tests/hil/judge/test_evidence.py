@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -113,7 +114,11 @@ def test_what_cannot_be_is_left_out_whoever_has_sent_it(short_log: Log, tmp_path
     estimate = decode_as(next(short_log.records(["follower/leader_estimate"])).payload, msg.LeaderEstimate)
     command = decode_as(next(short_log.records(["follower/command"])).payload, msg.Command)
     nonsense: dict[str, list[msg.Message]] = {
-        "follower/leader_estimate": [replace(estimate, header=never), replace(estimate, status=77)],
+        "follower/leader_estimate": [
+            replace(estimate, header=never),
+            replace(estimate, status=77),
+            replace(estimate, v1=math.inf),
+        ],
         "follower/command": [replace(command, capture=never.stamp)],
         "truth": [msg.Truth(never, 1, *[0.0] * 10)],
         "rigid_bodies": [msg.RigidBodies(never, 1, [])],
