@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import fields
 
 import numpy as np
 
 from estimation.estimate import QUANTITIES
 from estimation.tracking import Status
-from hil.wire.message_types import Command, LeaderEstimate, Message, Time
+from hil.wire.message_types import CertifiedEstimate, Command, LeaderEstimate, Message, Time, Truth
 from hil.wire.messages import MalformedPayloadError, to_ns
 
 _LARGEST = 1e12
@@ -22,6 +23,9 @@ def is_sound(message: Message) -> bool:
         if isinstance(message, LeaderEstimate):
             Status(message.status)
             return _can_be(message)
+        if isinstance(message, CertifiedEstimate | Command | Truth):
+            told = [getattr(message, field.name) for field in fields(message)]
+            return not any(isinstance(each, float) and abs(each) > _LARGEST for each in told)
     except (MalformedPayloadError, ValueError):
         return False
     return True

@@ -120,7 +120,7 @@ def test_what_cannot_be_is_left_out_whoever_has_sent_it(short_log: Log, tmp_path
             replace(estimate, v1=math.inf),
         ],
         "follower/command": [replace(command, capture=never.stamp)],
-        "truth": [msg.Truth(never, 1, *[0.0] * 10)],
+        "truth": [msg.Truth(never, 1, *[0.0] * 10), msg.Truth(header(1, ""), 1, *[math.inf] * 10)],
         "rigid_bodies": [msg.RigidBodies(never, 1, [])],
     }
     path = tmp_path / "more.mcap"
