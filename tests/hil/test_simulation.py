@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from hil.errors import CheckFailedError, UsageError
 from hil.scenario.files import load_scenario
@@ -132,8 +133,9 @@ def test_a_folder_that_cannot_be_is_named(tmp_path: Path) -> None:
 
 
 def test_a_motion_that_breaks_down_is_a_failed_check() -> None:
+    given = load_scenario("turtlebot3", ["run.duration_s=1.0"])
     with pytest.raises(CheckFailedError, match="breaks down"):
-        report_of("turtlebot3", "controller.mu_rho=1e300", "run.duration_s=1.0")
+        simulate(replace(given, controller=replace(given.controller, mu_rho=1e300)), None)
 
 
 def test_told_to_change_sides_the_follower_ends_on_the_other() -> None:
