@@ -8,9 +8,23 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
+from formation.kernel import kernel
+
 FloatArray = NDArray[np.float64]
 
 _TURN = 2.0 * math.pi
+
+
+@kernel
+def wrapped(angle: float) -> float:
+    """Angle [rad] in (-pi, pi] that differs by whole turns, exactly; NaN for NaN and infinities."""
+    if not math.isfinite(angle):
+        return math.nan
+    turned = angle if abs(angle) < _TURN else math.fmod(angle, _TURN)
+    # Both shifts are exact: the operands are within a factor of two of each other (Sterbenz).
+    if turned > math.pi:
+        turned = turned - _TURN
+    return turned + _TURN if turned <= -math.pi else turned
 
 
 @overload
@@ -26,10 +40,7 @@ def wrap(angle: float | FloatArray) -> float | FloatArray:
     """
     if isinstance(angle, np.ndarray):
         return _wrap_array(angle)
-    if not math.isfinite(angle):
-        return math.nan
-    wrapped = math.remainder(angle, _TURN)
-    return math.pi if wrapped == -math.pi else wrapped
+    return wrapped(angle)
 
 
 def _wrap_array(angle: FloatArray) -> FloatArray:

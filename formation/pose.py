@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
-from formation.angles import wrap
+from formation.angles import wrapped
+from formation.kernel import kernel
 
 
-@dataclass(frozen=True, slots=True)
-class Pose:
+class Pose(NamedTuple):
     """Position (x, y) [m] and heading theta [rad] in the world frame, heading counter-clockwise from x."""
 
     x: float
@@ -17,8 +17,7 @@ class Pose:
     theta: float
 
 
-@dataclass(frozen=True, slots=True)
-class Motion:
+class Motion(NamedTuple):
     """Speed v [m/s] along the heading and turn rate u [rad/s], counter-clockwise positive."""
 
     v: float
@@ -28,6 +27,7 @@ class Motion:
 STANDSTILL = Motion(0.0, 0.0)
 
 
+@kernel
 def advance(pose: Pose, v: float, u: float, dt: float) -> Pose:
     """Pose after driving for ``dt`` seconds at constant speed v and turn rate u; heading wrapped.
 
@@ -37,10 +37,12 @@ def advance(pose: Pose, v: float, u: float, dt: float) -> Pose:
     this one keeps full precision for every u, zero included. ``dt`` may be negative.
     """
     half_turn = 0.5 * u * dt
-    chord = v * dt * (math.sin(half_turn) / half_turn if half_turn else 1.0)
+    chord = v * dt
+    if half_turn != 0.0:
+        chord *= math.sin(half_turn) / half_turn
     direction = pose.theta + half_turn
     return Pose(
         pose.x + chord * math.cos(direction),
         pose.y + chord * math.sin(direction),
-        wrap(pose.theta + u * dt),
+        wrapped(pose.theta + u * dt),
     )

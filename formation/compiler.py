@@ -1,0 +1,79 @@
+"""The compiler behind :mod:`formation.kernel`: types, kernels and entries as numba has them.
+
+Only this module, :mod:`formation.compiled_records` and :mod:`formation.compile_cache` import numba. What they
+rest on of its internals is held by ``tests/formation/test_compiler.py``.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numba import from_dtype, njit, types
+from numba.extending import overload, overload_method
+
+from formation import records
+from formation.compile_cache import cache_of, one_at_a_time
+from formation.compiled_records import record_type, teach_records
+from formation.kernel import MARKED, Marked
+
+_JIT = {"error_model": "numpy", "fastmath": False}
+_ELEMENTS = {np.float64: types.float64, np.int64: types.int64, np.bool_: types.boolean, np.uint8: types.uint8}
+
+_taught = 0
+teach_records()
+
+
+def type_of(kind: Any) -> Any:
+    """Numba's type of what an entry takes or returns. Raises :class:`TypeError` for what none can."""
+    if kind is type(None):
+        return types.none
+    if kind is bytes:
+        return types.Bytes(types.uint8, 1, "C", readonly=True)
+    if get_origin(kind) is records.Rows:
+        return types.Array(from_dtype(records.dtype_of(get_args(kind)[0])), 1, "C")
+    if dimensions := getattr(kind, "__metadata__", ()):
+        element = get_args(get_args(get_args(kind)[0])[1])[0]
+        return types.Array(_ELEMENTS[element], dimensions[0], "C")
+    return record_type(kind)
+
+
+def compiled(function: Callable[..., Any]) -> Any:
+    """Compiled form of a function for the types of its annotations; of many processes only one compiles."""
+    _teach_new()
+    hints = get_type_hints(function, include_extras=True)
+    result = type_of(hints["return"])
+    signature = result(*(type_of(hints[name]) for name in inspect.signature(function).parameters))
+    dispatcher = njit(function, nogil=True, **_JIT)
+    with one_at_a_time():
+        cache = cache_of(function)
+        if cache is not None:
+            dispatcher._cache = cache
+        dispatcher.compile(signature)
+    dispatcher.disable_compile()
+    return dispatcher
+
+
+def _teach_new() -> None:
+    """Tell numba of the kernels that were marked since the last entry."""
+    global _taught
+    while _taught < len(MARKED):
+        _taught += 1
+        _teach(MARKED[_taught - 1])
+
+
+def _teach(marked: Marked) -> None:
+    function = marked.function
+    options = _JIT | {"forceinline": marked.inline}
+    owner, _, name = function.__qualname__.rpartition(".")
+    if not owner or owner.endswith("<locals>"):
+        overload(function, jit_options=options, strict=False)(lambda *args, **kwargs: function)
+        return
+
+    def method(record: Any, *args: Any, **kwargs: Any) -> Any:
+        return function if getattr(record.instance_class, name, None) is function else None
+
+    method.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]
+    overload_method(types.BaseNamedTuple, name, jit_options=options, strict=False)(method)

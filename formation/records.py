@@ -1,0 +1,191 @@
+"""Named tuples in rows of memory: what outlives a step, or is there a thousand times.
+
+Inside a kernel everything is a named tuple, handed on by value. What is kept between steps lies in rows,
+numpy arrays with a field for each of the tuple's, which their owner makes by :func:`rows_of` and lends to an
+entry. :func:`load` and :func:`store` are all that kernels do with them. In plain Python a list of tuples
+does as well as rows do.
+"""
+
+from __future__ import annotations
+
+import functools
+import struct
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any, Generic, NamedTuple, TypeVar, cast, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+R = TypeVar("R")
+
+Vector = Annotated[NDArray[np.float64], 1]
+Matrix = Annotated[NDArray[np.float64], 2]
+Tensor = Annotated[NDArray[np.float64], 3]
+Indices = Annotated[NDArray[np.int64], 1]
+IndexMatrix = Annotated[NDArray[np.int64], 2]
+IndexTensor = Annotated[NDArray[np.int64], 3]
+Flags = Annotated[NDArray[np.bool_], 1]
+FlagMatrix = Annotated[NDArray[np.bool_], 2]
+Buffer = Annotated[NDArray[np.uint8], 1]
+"""Arrays, contiguous in memory, as entries take them; the number counts their dimensions."""
+
+_SCALARS: dict[Any, Any] = {float: np.float64, int: np.int64, bool: np.bool_}
+
+
+class Rows(Generic[R]):
+    """Type of rows that hold named tuples of one class. There are no instances: the rows are numpy arrays."""
+
+    if TYPE_CHECKING:
+
+        def __len__(self) -> int: ...
+
+
+class Span(NamedTuple):
+    """Rows as compiled code hands them on: address and number. Who called in keeps the array alive."""
+
+    address: int
+    length: int
+
+
+def is_record(kind: Any) -> bool:
+    """Whether a class is a named tuple."""
+    return isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
+
+
+@functools.cache
+def dtype_of(kind: Any) -> np.dtype[np.void]:
+    """Aligned structured dtype of a named tuple of ``float``, ``int``, ``bool`` and named tuples of these.
+
+    Raises :class:`TypeError` for a field of another type.
+    """
+    hints = get_type_hints(kind)
+    fields: list[tuple[str, Any]] = []
+    for name in fields_of(kind):
+        hint = hints[name]
+        if is_record(hint):
+            fields.append((name, dtype_of(hint)))
+        elif hint in _SCALARS:
+            fields.append((name, _SCALARS[hint]))
+        else:
+            raise TypeError(f"{kind.__name__}.{name} is {hint}, expected float, int, bool or a named tuple")
+    return np.dtype(fields, align=True)
+
+
+def fields_of(kind: type) -> tuple[str, ...]:
+    """Names of a named tuple's fields."""
+    names: tuple[str, ...] = kind._fields  # type: ignore[attr-defined]
+    return names
+
+
+def rows_of(kind: type[R], count: int) -> Rows[R]:
+    """New rows, all zero.
+
+    >>> class Point(NamedTuple):
+    ...     x: float
+    ...     number: int
+    >>> points = rows_of(Point, 2)
+    >>> store(points, 1, Point(0.5, 7))
+    >>> load(Point, points, 1)
+    Point(x=0.5, number=7)
+    """
+    return cast("Rows[R]", np.zeros(count, dtype_of(cast("Any", kind))))
+
+
+def row_of(record: R) -> Rows[R]:
+    """One new row that holds a named tuple."""
+    rows = rows_of(type(record), 1)
+    store(rows, 0, record)
+    return rows
+
+
+def columns_of(rows: Rows[R]) -> NDArray[np.void]:
+    """The rows as the numpy array that they are, for whole columns at once."""
+    return cast("NDArray[np.void]", rows)
+
+
+def load(kind: type[R], rows: Rows[R], k: int) -> R:
+    """The k-th row as a named tuple."""
+    if isinstance(rows, list):
+        kept: R = rows[k]
+        return kept
+    made: R = _maker(cast("Any", kind))(columns_of(rows)[k].item())
+    return made
+
+
+def store(rows: Rows[R], k: int, record: R) -> None:
+    """Put a named tuple into the k-th row."""
+    if isinstance(rows, list):
+        rows[k] = record
+    else:
+        columns_of(rows)[k] = record
+
+
+def borrowed(rows: Rows[R]) -> Rows[R]:
+    """Rows to hand on within compiled code, where counting references would take longer than arithmetic."""
+    return rows
+
+
+def size(rows: Rows[R]) -> int:
+    """Number of rows."""
+    return len(rows)
+
+
+@functools.cache
+def _maker(kind: Any) -> Callable[[Any], Any]:
+    """Function that makes a named tuple out of nested plain tuples."""
+    hints = get_type_hints(kind)
+    nested = {k: _maker(hints[name]) for k, name in enumerate(fields_of(kind)) if is_record(hints[name])}
+    if not nested:
+        plain: Callable[[Any], Any] = kind._make
+        return plain
+
+    def made(values: Any) -> Any:
+        return kind._make(nested[k](value) if k in nested else value for k, value in enumerate(values))
+
+    return made
+
+
+# Bytes as they come off the wire: little-endian, at any offset.
+
+
+def read_float(payload: bytes, at: int) -> float:
+    """IEEE double at an offset."""
+    value: float = struct.unpack_from("<d", payload, at)[0]
+    return value
+
+
+def read_int32(payload: bytes, at: int) -> int:
+    """Signed 32-bit integer at an offset."""
+    value: int = struct.unpack_from("<i", payload, at)[0]
+    return value
+
+
+def read_uint32(payload: bytes, at: int) -> int:
+    """Unsigned 32-bit integer at an offset."""
+    value: int = struct.unpack_from("<I", payload, at)[0]
+    return value
+
+
+def read_byte(payload: bytes, at: int) -> int:
+    """Byte at an offset."""
+    return payload[at]
+
+
+def write_float(buffer: Buffer, at: int, value: float) -> None:
+    """Put an IEEE double at an offset."""
+    struct.pack_into("<d", buffer.data, at, value)
+
+
+def write_int32(buffer: Buffer, at: int, value: int) -> None:
+    """Put the low 32 bits of an integer at an offset."""
+    struct.pack_into("<I", buffer.data, at, value & 0xFFFFFFFF)
+
+
+def write_int64(buffer: Buffer, at: int, value: int) -> None:
+    """Put a 64-bit integer at an offset; of an unsigned one the bits."""
+    struct.pack_into("<Q", buffer.data, at, value & 0xFFFFFFFFFFFFFFFF)
+
+
+def write_byte(buffer: Buffer, at: int, value: int) -> None:
+    """Put a byte at an offset."""
+    buffer[at] = value
