@@ -29,12 +29,12 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from benchmarks.estimation import LIMITS, SD_U2, SD_V2
-from estimation.belief import Model
-from estimation.estimate import estimate_of
-from estimation.estimators import make_estimator, settling
-from estimation.measurement import FrontEnd, Measurement, PoseNoise, measure_body, measure_world
-from estimation.motion import FollowerMotion, ProcessNoise, Vector, process_noise, propagate
-from estimation.tracking import Status, Tracker, TrackSettings
+from estimation.filters.belief import Model
+from estimation.filters.estimators import make_estimator, settling
+from estimation.models.measurement import FrontEnd, Measurement, PoseNoise, measure_body, measure_world
+from estimation.models.motion import FollowerMotion, ProcessNoise, Vector, process_noise, propagate
+from estimation.tracking.estimate import estimate_of
+from estimation.tracking.tracker import Status, Tracker, TrackSettings
 from formation.angles import wrap
 from formation.pose import Pose, advance
 from formation.shape import shape_of

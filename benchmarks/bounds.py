@@ -21,9 +21,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from estimation.bound_check import QUANTITY_OF
-from estimation.bound_trials import FIG2, LEVELS, TURTLEBOT3, judge_trials
-from formation.adversary import drive_out
+from benchmarks.adversary import drive_out
+from benchmarks.bound_trials import FIG2, LEVELS, TURTLEBOT3, judge_trials
+from estimation.bounds.bound_check import QUANTITY_OF
 from formation.invariant_set import Disturbed, invariant_set
 from formation.speed_range import SpeedRange
 from formation.steering_margin import steering_margin

@@ -19,11 +19,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from hil.log.events import logged_events
+from hil.lockstep.run import run_lockstep
+from hil.log.events import Timed, logged_events
 from hil.log.reader import read_log
 from hil.nodes.estimator import EstimatorNode
-from hil.nodes.lockstep_run import run_lockstep
-from hil.replay.journal import Timed
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario
 from hil.wire import topics

@@ -28,9 +28,9 @@ from hil.emulator.node import EmulatorState
 from hil.judge.evidence import Span
 from hil.judge.noise_free_orbit import noise_free_orbit
 from hil.judge.true_states import TrueStates
+from hil.lockstep.lockstep import EPOCH_NS, Lockstep
+from hil.lockstep.run import make_nodes, run_lockstep
 from hil.log.reader import read_log
-from hil.nodes.lockstep import EPOCH_NS, Lockstep
-from hil.nodes.lockstep_run import make_nodes, run_lockstep
 from hil.nodes.node import Outgoing
 from hil.replay.timing import timing_of
 from hil.scenario.files import load_scenario

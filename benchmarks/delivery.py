@@ -20,14 +20,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from estimation.estimate import Estimate
+from estimation.tracking.estimate import Estimate
 from formation.pose import Motion, Pose, advance
 from hil.emulator.lab_messages import frame_message, odometry_message
+from hil.lockstep.lockstep import EPOCH_NS
 from hil.nodes.estimator import EstimatorNode
-from hil.nodes.lockstep import EPOCH_NS
-from hil.nodes.node import Event
 from hil.scenario.files import load_scenario
 from hil.wire import topics
+from hil.wire.events import Event
 from hil.wire.messages import encode
 
 SOURCES = ("odometry", "mocap", "fused")

@@ -22,17 +22,17 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from estimation.belief import Belief, Model, innovation
-from estimation.cramer_rao import TruePath, cramer_rao
-from estimation.estimate import estimate_of
-from estimation.estimator import Estimator
-from estimation.estimators import ESTIMATORS, make_estimator
-from estimation.inputs import mean_motion
-from estimation.measurement import FrontEnd, Measurement, PoseNoise, measure_world
-from estimation.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise
-from estimation.random_leaders import random_leader
-from estimation.smoother import smooth
-from estimation.tracking import Status, Tracker, TrackSettings
+from benchmarks.random_leaders import random_leader
+from estimation.consistency.cramer_rao import TruePath, cramer_rao
+from estimation.filters.belief import Belief, Model, innovation
+from estimation.filters.estimator import Estimator
+from estimation.filters.estimators import ESTIMATORS, make_estimator
+from estimation.models.measurement import FrontEnd, Measurement, PoseNoise, measure_world
+from estimation.models.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise
+from estimation.own_motion.inputs import mean_motion
+from estimation.tracking.estimate import estimate_of
+from estimation.tracking.smoother import smooth
+from estimation.tracking.tracker import Status, Tracker, TrackSettings
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
 from formation.shape import shape_of

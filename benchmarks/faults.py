@@ -29,11 +29,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from controllers.laws import independent
 from controllers.limits import Limits
-from estimation.estimate import Estimate, estimate_at
-from estimation.inputs import History, MotionSample, follower_motion, remember
-from estimation.measurement import FrontEnd, measure_body_from_mocap, measure_world
-from estimation.screening import NO_DOUBT
-from estimation.tracking import Status, Track, Verdict
+from estimation.models.measurement import FrontEnd, measure_body_from_mocap, measure_world
+from estimation.own_motion.inputs import History, MotionSample, follower_motion, remember
+from estimation.tracking.estimate import Estimate, estimate_at
+from estimation.tracking.screening import NO_DOUBT
+from estimation.tracking.tracker import Status, Track, Verdict
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
 from formation.shape import Shape, follower_pose, shape_of, shape_rates
@@ -128,7 +128,7 @@ def noisy(pose: Pose, scenario: Scenario, generator: np.random.Generator) -> Pos
 
 
 def errors_of(found: Estimate, pair: Pair, leader: Motion, follower: Motion) -> dict[str, float]:
-    """Errors against the truth, in the order of ``estimation.estimate.QUANTITIES`` but for u1."""
+    """Errors against the truth, in the order of ``estimation.tracking.estimate.QUANTITIES`` but for u1."""
     shape = shape_of(pair.leader, pair.follower)
     rates = shape_rates(shape, leader, follower)
     return {

@@ -22,11 +22,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from estimation import kernels
-from estimation.belief import Belief, Model
-from estimation.estimators import make_estimator
-from estimation.measurement import FrontEnd, Measurement
-from estimation.motion import FollowerMotion, LeaderLimits, ProcessNoise
+from estimation.filters import kernels
+from estimation.filters.belief import Belief, Model
+from estimation.filters.estimators import make_estimator
+from estimation.models.measurement import FrontEnd, Measurement
+from estimation.models.motion import FollowerMotion, LeaderLimits, ProcessNoise
 
 DT = 1.0 / 120.0
 LIMITS = LeaderLimits(v_eps=0.04, k_v=0.22, k_u=0.7)

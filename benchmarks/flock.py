@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from benchmarks.virtual_leader import virtual_leader
 from controllers.flock import Choice, FlockTrajectory, simulate_flock
 from controllers.laws import LAWS, Gains
 from controllers.limits import Limits
@@ -32,7 +33,6 @@ from formation.pose import Motion, Pose
 from formation.shape import shape_of
 from formation.spacing import Spacing
 from formation.station import Side, Station
-from formation.virtual_leader import virtual_leader
 
 FloatArray = NDArray[np.float64]
 

@@ -23,8 +23,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from benchmarks.feedforward import distance_mm
 from controllers.gain_design import design
-from hil.gain_proposal import propose, task_of
 from hil.scenario.files import load_scenario
+from hil.simulate.gain_proposal import propose, task_of
 
 Gains = tuple[float, float, float]
 """mu1, mu2, mu_rho."""

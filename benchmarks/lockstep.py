@@ -15,7 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from hil.nodes.lockstep_run import run_lockstep
+from hil.lockstep.run import run_lockstep
 from hil.scenario.files import load_scenario
 
 KINDS = ("ekf", "ekf-filterpy")

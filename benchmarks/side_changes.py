@@ -18,8 +18,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from benchmarks.side_change_trial import SETTINGS, Result, Setting, random_run
 from controllers.side_change import CORRECTION
-from controllers.side_change_trial import SETTINGS, Result, Setting, random_run
 
 
 def _one(task: tuple[Setting, int, bool, float]) -> Result:

@@ -25,9 +25,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from hil.emulator import node as emulator
+from hil.lockstep.lockstep import EPOCH_NS, Lockstep
 from hil.nodes import controller, estimator, lockstep_run
 from hil.nodes import node as nodes
-from hil.nodes.lockstep import EPOCH_NS, Lockstep
 from hil.nodes.node import Outgoing
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario

@@ -1,6 +1,6 @@
 """A flock in which each agent follows the mean of its nearest neighbours, compiled: choice, rates, solver.
 
-The laws are those of :mod:`controllers.laws` and the virtual leader that of :mod:`formation.virtual_leader`,
+The laws are those of :mod:`controllers.laws` and the virtual leader that of :mod:`benchmarks.virtual_leader`,
 which they are tested against; all that a kernel calls is in this one file because the cache of compiled code
 looks at the file of a kernel only. Importing this module compiles the kernels or loads them from the cache.
 

@@ -117,7 +117,7 @@ def independent(shape: Shape, v1: float, u1: float, gains: Gains, limits: Limits
 LAWS: Mapping[str, Law] = MappingProxyType(
     {"independent": independent, "ideal": ideal, "feedforward": ideal, "faded": ideal}
 )
-"""Laws by name. The last three are one: they differ by where u1 is from (:mod:`estimation.foresight`)."""
+"""Laws by name. The last three are one, but for where u1 is from (:mod:`estimation.tracking.foresight`)."""
 
 
 def _steered(shape: Shape, v1: float, v2: float, gains: Gains, limits: Limits | None) -> Motion:

@@ -68,11 +68,6 @@ def shape_rates(shape: Shape, leader: Motion, follower: Motion) -> ShapeRates:
     )
 
 
-def reduced_rates(rho: float, alpha1: float, leader: Motion, v2: float) -> tuple[float, float]:
-    """(rho_dot, alpha1_dot) on the manifold alpha2 = pi/2, Eq. (5) of the paper. Needs rho > 0."""
-    return -leader.v * math.cos(alpha1), (leader.v * math.sin(alpha1) + v2) / rho - leader.u
-
-
 def leader_velocity(
     rho: float, alpha2: float, rho_dot: float, alpha2_dot: float, follower: Motion
 ) -> tuple[float, float]:
@@ -94,11 +89,3 @@ def polar_velocity(x: float, y: float) -> tuple[float, float]:
     that stands still has no direction: it gives v1 = 0 and an alpha1 without meaning.
     """
     return math.hypot(x, y), wrap(math.atan2(y, x))
-
-
-def relative_rates(
-    rho: float, alpha2: float, v1: float, alpha1: float, follower: Motion
-) -> tuple[float, float]:
-    """(rho_dot, alpha2_dot) that a leader of speed v1 and bearing alpha1 causes: inverse of the two above."""
-    rates = shape_rates(Shape(rho, alpha1, alpha2), Motion(v1, 0.0), follower)
-    return rates.rho_dot, rates.alpha2_dot

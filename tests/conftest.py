@@ -16,16 +16,16 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeat"))
 
 SLOWEST = (
     "tests/hil/live/test_run.py",
-    "tests/estimation/test_tracking.py",
+    "tests/estimation/tracking/test_tracker.py",
     "tests/hil/sweep/test_results.py",
-    "tests/hil/test_offline_commands.py",
+    "tests/hil/commands/test_offline_commands.py",
     "tests/hil/replay/test_rerun.py",
     "tests/hil/live/test_daemon.py",
     "tests/hil/test_command_line.py",
     "tests/hil/reports/test_run_report.py",
-    "tests/estimation/test_kalman.py",
+    "tests/estimation/filters/test_kalman.py",
     "tests/hil/sweep/test_engine.py",
-    "tests/hil/test_chain_run.py",
+    "tests/hil/lockstep/test_chain_run.py",
 )
 """Files whose tests take longest, the longest first: begun last, one would keep a worker busy alone."""
 

@@ -6,7 +6,7 @@ import sys
 
 import click
 
-from hil.report_json import print_json
+from hil.log.report_json import print_json
 from hil.scenario.files import load_scenario
 
 
@@ -20,7 +20,7 @@ def command(scenario: str, overrides: tuple[str, ...], as_json: bool) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from hil.certificate import certificate_json, certificate_lines, certificate_of
+    from hil.scenario.certificate import certificate_json, certificate_lines, certificate_of
 
     certificate = certificate_of(load_scenario(scenario, overrides))
     if as_json:

@@ -9,10 +9,10 @@ import click
 
 from hil.commands.seconds import Seconds
 from hil.errors import UsageError
-from hil.report_json import print_json
+from hil.log.report_json import print_json
 
 if TYPE_CHECKING:
-    from estimation.sensor_bias import SensorBias
+    from estimation.calibration.sensor_bias import SensorBias
     from hil.replay.timing import Timing
     from hil.scenario.schema import Scenario
 

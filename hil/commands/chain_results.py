@@ -14,12 +14,7 @@ from hil.judge.chain_pairs import driven_trajectory
 from hil.judge.chain_summary import summarise_chain
 from hil.judge.chain_text import print_chain
 from hil.judge.evidence import Evidence, evidence_of_link
-from hil.judged_log import made_folder
-from hil.log.metadata import scenario_of
-from hil.log.reader import Log
-from hil.replay.estimate_csv import write_estimates
-from hil.replay.rerun import replay_chain
-from hil.replay.verdict import (
+from hil.judge.replay_verdict import (
     evaluated,
     evidence_of_replay,
     parity_json,
@@ -27,7 +22,12 @@ from hil.replay.verdict import (
     violated_bounds,
     why_not_same,
 )
-from hil.report_json import print_json, write_json
+from hil.log.metadata import scenario_of
+from hil.log.reader import Log
+from hil.log.report_json import print_json, write_json
+from hil.replay.estimate_csv import write_estimates
+from hil.replay.rerun import replay_chain
+from hil.reports.judged_log import made_folder
 from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from hil.report_json import print_json
+from hil.log.report_json import print_json
 from hil.scenario.files import load_scenario
 
 
@@ -14,7 +14,7 @@ from hil.scenario.files import load_scenario
 @click.option("--json", "as_json", is_flag=True, help="Print the proposal as one JSON object.")
 def command(scenario: str, overrides: tuple[str, ...], as_json: bool) -> None:
     """Propose gains for SCENARIO, and say for each what bounds it; or say why none work."""
-    from hil.gain_proposal import propose, told
+    from hil.simulate.gain_proposal import propose, told
 
     proposal = propose(load_scenario(scenario, overrides))
     if as_json:

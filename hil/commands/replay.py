@@ -10,8 +10,8 @@ import click
 
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
-from hil.judged_log import leave, made_folder
-from hil.report_json import print_json
+from hil.log.report_json import print_json
+from hil.reports.judged_log import leave, made_folder
 from hil.scenario.certify import CERTIFY, same_steps
 
 if TYPE_CHECKING:
@@ -61,11 +61,11 @@ def command(
     --from and --to are seconds since the leader set off, for imported recordings the source's own time; the
     steps always begin where the log does.
     """
-    from hil.judge.own_motion import judge_own_motion
+    from hil.judge.replay_verdict import evidence_of_replay, parity_json, violated_bounds, why_not_same
     from hil.judge.summary import summarise
     from hil.judge.summary_text import print_summary
     from hil.log.reader import read_log
-    from hil.replay.verdict import evidence_of_replay, parity_json, violated_bounds, why_not_same
+    from hil.replay.odometry_alignment import judge_own_motion
 
     if from_s is not None and to_s is not None and to_s <= from_s:
         raise UsageError(f"--to {to_s:g}: expected more than --from {from_s:g}")
@@ -112,10 +112,10 @@ def _played(
     verify: bool,
 ) -> Replay:
     """Replay of one of our logs, or of another lab's by its topic map."""
+    from hil.judge.replay_verdict import refuse_other_steps
     from hil.log.metadata import scenario_of
     from hil.replay.rerun import replay, replay_foreign, replay_link
     from hil.replay.topic_map import load_topic_map
-    from hil.replay.verdict import refuse_other_steps
     from hil.scenario.files import with_overrides
     from hil.scenario.links import chain_of, link_of
 
@@ -176,8 +176,8 @@ def _refuse_leader(leader: str | None) -> None:
 
 
 def _write(evidence: Evidence, summary: dict[str, Any], table: Path | None, out: Path | None) -> None:
+    from hil.judge.replay_verdict import evaluated
     from hil.replay.estimate_csv import write_estimates
-    from hil.replay.verdict import evaluated
 
     if table is not None:
         write_estimates(evaluated(evidence), table)

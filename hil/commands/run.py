@@ -12,8 +12,8 @@ import click
 
 from hil.commands.seconds import DURATION
 from hil.errors import CheckFailedError, UsageError
-from hil.judged_log import claimed, judge_log, made_folder
-from hil.report_json import print_json
+from hil.log.report_json import print_json
+from hil.reports.judged_log import claimed, judge_log, made_folder
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario, refuse_unrunnable
 from hil.scenario.links import chain_of, links_of
@@ -90,7 +90,7 @@ def _folder(scenario: Scenario, out: Path | None) -> Path:
 
 
 def _lockstep(scenario: Scenario, log_path: Path) -> str:
-    from hil.nodes.lockstep_run import make_nodes, run_lockstep
+    from hil.lockstep.run import make_nodes, run_lockstep
 
     nodes = make_nodes(scenario)
     begun = time.perf_counter()

@@ -10,7 +10,7 @@ import msgspec
 
 from hil.commands.seconds import DURATION
 from hil.errors import UsageError
-from hil.report_json import known, print_json
+from hil.log.report_json import known, print_json
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
 
@@ -59,15 +59,15 @@ def _simulate(scenario: Scenario, out: Path | None, *, stability: bool) -> dict[
             raise UsageError(
                 f"scenario {scenario.name}: it has a [chain] and a [flock]; leave one of them out"
             )
-        from hil.chain_simulation import simulate_chain_of
+        from hil.simulate.chain_simulation import simulate_chain_of
 
         return simulate_chain_of(scenario, chain.agents, out)
     if not isinstance(flock, msgspec.UnsetType):
         _refuse_what_is_for_a_pair(scenario, "flock", stability=stability)
-        from hil.flock_simulation import simulate_flock_of
+        from hil.simulate.flock_simulation import simulate_flock_of
 
         return simulate_flock_of(scenario, flock, out)
-    from hil.simulation import simulate
+    from hil.simulate.pair_simulation import simulate
 
     return simulate(scenario, out, stability=stability)
 

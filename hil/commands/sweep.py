@@ -12,7 +12,7 @@ import click
 
 from hil.commands.seconds import Seconds
 from hil.errors import UsageError
-from hil.report_json import print_json
+from hil.log.report_json import print_json
 from hil.sweep.spec import Sweep, load_sweep
 
 

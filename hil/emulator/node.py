@@ -28,7 +28,7 @@ from hil.emulator.mocap import (
     observe,
 )
 from hil.emulator.robot import Actuators, Robot, drive
-from hil.nodes.node import Counts, Event, Outgoing, counted, diagnostics, named_counts, no_counts, outgoing
+from hil.nodes.node import Counts, Outgoing, counted, diagnostics, named_counts, no_counts, outgoing
 from hil.scenario.links import links_of, node_names
 from hil.scenario.ordered_sides import ordered_sides
 from hil.scenario.parts import leader_program
@@ -37,6 +37,7 @@ from hil.scenario.start import chain_poses
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.drive_message import drive_message, read_drive
+from hil.wire.events import Event
 from hil.wire.messages import MalformedPayloadError, decode_as
 from hil.wire.topics import link_topics
 

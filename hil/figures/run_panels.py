@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.axes import Axes
 
-from estimation.bounds import Values
-from estimation.estimate import QUANTITIES
+from estimation.bounds.error_bounds import Values
+from estimation.tracking.estimate import QUANTITIES
 from formation.angles import FloatArray, wrap
 from hil.figures.panel_strokes import (
     BELIEVED,

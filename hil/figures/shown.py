@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.bound_check import ROUNDING
-from estimation.tracking import Status
+from estimation.bounds.bound_check import ROUNDING
+from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
 from hil.judge.bounds import WorstErrors, bound_errors, named_bounds, worst_errors
 from hil.judge.certified import CertifiedColumns

@@ -14,9 +14,9 @@ from matplotlib.ticker import NullFormatter, ScalarFormatter
 
 from controllers.attraction import SettlingMap
 from formation.spacing import Spacing
+from hil.judge.stability import PROVED_V1, Gain, Stability
 from hil.scenario.parts import gains
 from hil.scenario.schema import Scenario
-from hil.stability import PROVED_V1, Gain, Stability
 
 PROVED, RUN, WORST, TURN, LOST = "#b03030", "#1f5fa8", "#d9741a", "#2a8f4c", "#d8d8d8"
 DPI = 130

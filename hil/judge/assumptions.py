@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.bound_check import QUANTITY_OF, ROUNDING, check
+from estimation.bounds.bound_check import QUANTITY_OF, ROUNDING, check
 from formation.angles import FloatArray
 from hil.judge.bounds import WorstErrors, actual_errors, assumed_errors, bound_errors, named_bounds
 from hil.judge.columns import Columns

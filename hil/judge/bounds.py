@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.bound_check import SpeedInputs, all_bounds, check, errors_of
-from estimation.bounds import InputErrors, RateErrors, Values
+from estimation.bounds.bound_check import SpeedInputs, all_bounds, check, errors_of
+from estimation.bounds.error_bounds import InputErrors, RateErrors, Values
 from formation.angles import FloatArray, wrap
 from formation.spacing import Spacing
-from hil.certificate import premises_of
 from hil.judge.columns import Columns, EstimateColumns
+from hil.scenario.certificate import premises_of
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 from hil.wire.estimate_message import AssumedErrors

@@ -8,7 +8,7 @@ from typing import Any
 from hil.judge.chain_pairs import DRIVEN, driven_trajectory, pair_figures, settling_times
 from hil.judge.evidence import Evidence
 from hil.judge.summary import summarise
-from hil.report_json import known
+from hil.log.report_json import known
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from estimation.clock import NOTHING_HEARD, SLOT_NS, SPAN_NS, Arrival, Line, heard, jitter_of, lower_line
+from estimation.time.clock import NOTHING_HEARD, SLOT_NS, SPAN_NS, Arrival, Line, heard, jitter_of, lower_line
 
 
 def judge_clock(arrivals: Sequence[Arrival]) -> dict[str, object]:

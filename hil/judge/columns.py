@@ -9,8 +9,8 @@ from operator import attrgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.bounds import Perceived
-from estimation.tracking import Status
+from estimation.bounds.error_bounds import Perceived
+from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
 from hil.judge.evidence import Evidence, Span, evaluation_span, run_span
 from hil.judge.true_states import Stamps, TrueStates

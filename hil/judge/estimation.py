@@ -8,12 +8,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.belief import Model
-from estimation.cramer_rao import TruePath, cramer_rao
-from estimation.estimate import QUANTITIES
-from estimation.measurement import FrontEnd, PoseNoise
-from estimation.motion import LeaderLimits, ProcessNoise
-from estimation.tracking import Status
+from estimation.consistency.cramer_rao import TruePath, cramer_rao
+from estimation.filters.belief import Model
+from estimation.models.measurement import FrontEnd, PoseNoise
+from estimation.models.motion import LeaderLimits, ProcessNoise
+from estimation.tracking.estimate import QUANTITIES
+from estimation.tracking.tracker import Status
 from formation.angles import FloatArray, wrap
 from hil.judge.columns import Columns, EstimateColumns, inside
 from hil.judge.evidence import Evidence, Span

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, TypeVar
 
-from estimation.clock import Arrival
-from hil.certificate import certificate_json, certificate_of
+from estimation.time.clock import Arrival
 from hil.errors import UsageError
 from hil.judge.side_orders import Order, orders_of
 from hil.judge.sound_messages import is_sound
 from hil.log.metadata import IMPORT, mode_of, recorded_certificate, scenario_of
 from hil.log.reader import Log, Record
 from hil.nodes.node import digest
+from hil.scenario.certificate import certificate_json, certificate_of
 from hil.scenario.certify import same_steps
 from hil.scenario.links import Link
 from hil.scenario.schema import Scenario

@@ -7,8 +7,8 @@ from dataclasses import fields
 
 import numpy as np
 
-from estimation.estimate import QUANTITIES
-from estimation.tracking import Status
+from estimation.tracking.estimate import QUANTITIES
+from estimation.tracking.tracker import Status
 from hil.wire.message_types import CertifiedEstimate, Command, LeaderEstimate, Message, Time, Truth
 from hil.wire.messages import MalformedPayloadError, to_ns
 

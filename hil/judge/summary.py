@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.certificate import certificate_json, certificate_of
 from hil.judge.assumptions import judge_assumptions
 from hil.judge.bounds import judge_bounds
 from hil.judge.certified import judge_certified
@@ -17,7 +16,8 @@ from hil.judge.columns import Columns, columns_of
 from hil.judge.estimation import judge_estimation
 from hil.judge.evidence import Evidence
 from hil.judge.formation import judge_formation
-from hil.report_json import known
+from hil.log.report_json import known
+from hil.scenario.certificate import certificate_json, certificate_of
 from hil.scenario.ordered_sides import refusal
 
 _STRANGERS = "unknown_body"

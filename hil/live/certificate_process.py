@@ -56,8 +56,8 @@ class CertificateProcess:
 
 def _certify(niceness: int) -> None:
     os.nice(niceness)
-    from hil.certificate import certificate_json, certificate_of
-    from hil.report_json import as_json
+    from hil.log.report_json import as_json
+    from hil.scenario.certificate import certificate_json, certificate_of
 
     scenario = build_scenario(tomllib.loads(sys.stdin.read()), source="scenario of the recorder")
     sys.stdout.write(as_json(certificate_json(certificate_of(scenario))))

@@ -12,8 +12,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from types import FrameType
 from typing import Any, Protocol
 
-from hil.nodes.node import TICK, Event, Node, Outgoing, outgoing
+from hil.nodes.node import Node, Outgoing, outgoing
 from hil.wire import topics
+from hil.wire.events import TICK, Event
 from hil.wire.message_types import String
 from hil.wire.pubsub import Inbox, Wire
 from hil.wire.session import Endpoints, close_session, open_session

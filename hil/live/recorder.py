@@ -9,18 +9,10 @@ import numpy as np
 from hil.live.certificate_process import CertificateProcess
 from hil.log.metadata import log_metadata
 from hil.log.writer import LogWriter
-from hil.nodes.node import (
-    Event,
-    Outgoing,
-    counted,
-    diagnostics,
-    is_due,
-    named_counts,
-    no_counts,
-    outgoing,
-)
+from hil.nodes.node import Outgoing, counted, diagnostics, is_due, named_counts, no_counts, outgoing
 from hil.scenario.schema import Scenario
 from hil.wire import topics
+from hil.wire.events import Event
 from hil.wire.message_types import Malformed
 from hil.wire.messages import MalformedPayloadError, decode, encode, header, typename_of
 

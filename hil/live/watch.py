@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import zenoh
 
-from estimation.tracking import Status
+from estimation.tracking.tracker import Status
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.messages import MalformedPayloadError, decode_as, to_ns

@@ -3,16 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 
 from hil.errors import UsageError
 from hil.log.reader import Log
-from hil.nodes.node import Event
-from hil.replay.journal import Recorded, Timed
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
+from hil.wire.events import Event
 from hil.wire.messages import MalformedPayloadError, decode_as, to_ns, typename_of
 from hil.wire.topics import topics_of
+
+Timed = tuple[Event, int]
+"""An event and the ``now_ns`` at which a node takes it in."""
+
+Receipt = tuple[int, int]
+"""The digest of an input and the ``now_ns`` at which it was taken in."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """An output as it was logged.
+
+    ``computed_ns``: when it was made, None if its payload cannot be read. ``consumed``: the inputs since the
+    output before, in order.
+    """
+
+    payload: bytes
+    computed_ns: int | None
+    consumed: tuple[Receipt, ...] = ()
 
 
 def logged_events(log: Log, names: Collection[str]) -> Iterator[Timed]:
@@ -112,5 +131,5 @@ def _recorded_command(payload: bytes) -> Recorded:
         return Recorded(payload, None)
 
 
-def _receipts(consumed: Collection[msg.Consumed]) -> tuple[tuple[int, int], ...]:
+def _receipts(consumed: Collection[msg.Consumed]) -> tuple[Receipt, ...]:
     return tuple((receipt.digest, to_ns(receipt.received)) for receipt in consumed)

@@ -10,7 +10,7 @@ from typing import Any
 from hil import __version__
 from hil.errors import UsageError
 from hil.log.reader import Log
-from hil.report_json import as_json
+from hil.log.report_json import as_json
 from hil.scenario.files import build_scenario, scenario_text
 from hil.scenario.schema import Scenario
 

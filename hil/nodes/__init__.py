@@ -1,1 +1,1 @@
-"""The pure steps of estimator and controller, and the lockstep that runs them."""
+"""The pure steps of estimator and controller."""

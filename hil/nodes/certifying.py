@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from estimation.certified import Certain, Failed
-from estimation.certified_positions import PositionCertifier
-from estimation.certified_sightings import SightingCertifier, SightingErrors, velocity_error
-from estimation.guarantees import leader_acceleration
-from estimation.inputs import History
-from estimation.measurement import Measurement
-from estimation.recent import NOTHING_RECENT, Recent
+from estimation.bounds.certified import Certain, Failed
+from estimation.bounds.certified_positions import PositionCertifier
+from estimation.bounds.certified_sightings import SightingCertifier, SightingErrors, velocity_error
+from estimation.bounds.guarantees import leader_acceleration
+from estimation.bounds.recent import NOTHING_RECENT, Recent
+from estimation.models.measurement import Measurement
+from estimation.own_motion.inputs import History
 from hil.errors import UsageError
 from hil.scenario.noise_bounds import NOISE_SIGMAS, position_bound
 from hil.scenario.schema import Scenario

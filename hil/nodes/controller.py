@@ -11,16 +11,15 @@ from msgspec.structs import replace
 from controllers.guard import Decision, decide
 from controllers.resolution import NOTHING_OWED, Resolution
 from controllers.station_keeper import Keeping
-from estimation.estimate import Estimate
-from estimation.foresight import TurnTrend
-from estimation.prediction import SentCommand, predict_shape
-from estimation.tracking import Status
+from estimation.tracking.estimate import Estimate
+from estimation.tracking.foresight import TurnTrend
+from estimation.tracking.prediction import SentCommand, predict_shape
+from estimation.tracking.tracker import Status
 from formation.pose import Motion
 from formation.station import Side
 from hil.nodes.leader_turn import LeaderTurn
 from hil.nodes.node import (
     Counts,
-    Event,
     Outgoing,
     consumed,
     counted,
@@ -36,6 +35,7 @@ from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.drive_message import drive_message, read_drive
 from hil.wire.estimate_message import from_message
+from hil.wire.events import Event
 from hil.wire.intake import CLOCK_TOLERANCE_NS
 from hil.wire.messages import MalformedPayloadError, decode_as, header, to_time
 from hil.wire.topics import topics_of

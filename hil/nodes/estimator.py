@@ -10,10 +10,7 @@ from dataclasses import replace as with_changes
 from msgspec import Struct, field
 from msgspec.structs import replace
 
-from estimation.estimate import Estimate, estimate_at
-from estimation.host_time import HostTime
-from estimation.inputs import remember
-from estimation.measurement import (
+from estimation.models.measurement import (
     FrontEnd,
     Measurement,
     PoseNoise,
@@ -22,17 +19,19 @@ from estimation.measurement import (
     measure_body_from_mocap,
     measure_world,
 )
-from estimation.odometry_correction import reconsidered, with_pose, with_sample
-from estimation.own_motion import OwnTrack
-from estimation.screening import Cause
-from estimation.tracking import Status, Track, Verdict, cause_at
+from estimation.own_motion.inputs import remember
+from estimation.own_motion.odometry_correction import reconsidered, with_pose, with_sample
+from estimation.own_motion.own_track import OwnTrack
+from estimation.time.host_time import HostTime
+from estimation.tracking.estimate import Estimate, estimate_at
+from estimation.tracking.screening import Cause
+from estimation.tracking.tracker import Status, Track, Verdict, cause_at
 from formation.angles import wrap
 from hil.nodes.certifying import Believed, certifying
 from hil.nodes.frame_time import FrameTime
 from hil.nodes.leader_filter import leader_tracker, offsets_report
 from hil.nodes.node import (
     Counts,
-    Event,
     Outgoing,
     consumed,
     counted,
@@ -49,6 +48,7 @@ from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.certified_message import certified_message
 from hil.wire.estimate_message import AssumedErrors, to_message
+from hil.wire.events import Event
 from hil.wire.intake import CLOCK_TOLERANCE_NS, RefusedError, read_frame, read_odometry, read_sighting
 from hil.wire.message_types import Consumed
 from hil.wire.topics import topics_of

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from estimation.belief import Belief, Model
-from estimation.estimator import Estimator
-from estimation.estimators import make_estimator, settling
-from estimation.measurement import FrontEnd
-from estimation.memory import SensorOffsets
-from estimation.motion import LeaderLimits, ProcessNoise
-from estimation.own_motion import ODOMETRY_CORRELATION, TRACK_CORRELATION
-from estimation.tracking import Tracker, TrackSettings
+from estimation.filters.belief import Belief, Model
+from estimation.filters.estimator import Estimator
+from estimation.filters.estimators import make_estimator, settling
+from estimation.filters.memory import SensorOffsets
+from estimation.models.measurement import FrontEnd
+from estimation.models.motion import LeaderLimits, ProcessNoise
+from estimation.own_motion.own_track import ODOMETRY_CORRELATION, TRACK_CORRELATION
+from estimation.tracking.tracker import Tracker, TrackSettings
 from hil.errors import UsageError
 from hil.scenario.schema import Scenario
 
@@ -43,7 +43,7 @@ def leader_filter(scenario: Scenario) -> Estimator:
     if not given.bias_states:
         return make_estimator(given.kind, model, given.difference_cutoff_s)
     refuse_bias_states(scenario)
-    from estimation.bias_filter import BiasedExtended
+    from estimation.filters.bias_filter import BiasedExtended
 
     return BiasedExtended(model, given.sigma_range_bias, given.sigma_bearing_bias)
 

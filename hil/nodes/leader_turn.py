@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from estimation.estimate import QUANTITIES, Estimate
-from estimation.foresight import TurnTrend
+from estimation.tracking.estimate import QUANTITIES, Estimate
+from estimation.tracking.foresight import TurnTrend
 from hil.scenario.parts import foresight
 from hil.scenario.schema import Scenario
 

@@ -12,22 +12,13 @@ from typing import Protocol, TypeVar
 
 from msgspec import Struct
 
+from hil.wire.events import Event
 from hil.wire.message_types import Consumed, DiagnosticArray, DiagnosticStatus, KeyValue, Message
 from hil.wire.messages import encode, header, to_time, typename_of
 
 S = TypeVar("S")
 
 Counts = Mapping[str, int]
-
-
-class Event(Struct, frozen=True):
-    """What happens to a node: a payload on a topic or, with an empty ``topic``, the passing of time."""
-
-    topic: str = ""
-    payload: bytes = b""
-
-
-TICK = Event()
 
 
 class Outgoing(Struct, frozen=True):

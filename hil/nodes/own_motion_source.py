@@ -5,13 +5,13 @@ from __future__ import annotations
 import bisect
 from dataclasses import dataclass, field, replace
 
-from estimation.inputs import History, InputTrust, follower_motion
-from estimation.measurement import Measurement, PoseNoise
-from estimation.motion import FollowerMotion
-from estimation.odometry_correction import IDEAL, NOTHING_SEEN, Watch
-from estimation.own_motion import OwnNoise, OwnTrack, fold, own_motion, refolded
-from estimation.retelling import retold
-from estimation.tracking import Track, Tracker
+from estimation.models.measurement import Measurement, PoseNoise
+from estimation.models.motion import FollowerMotion
+from estimation.own_motion.inputs import History, InputTrust, follower_motion
+from estimation.own_motion.odometry_correction import IDEAL, NOTHING_SEEN, Watch
+from estimation.own_motion.own_track import OwnNoise, OwnTrack, fold, own_motion, refolded
+from estimation.tracking.retelling import retold
+from estimation.tracking.tracker import Track, Tracker
 from formation.pose import Pose
 from hil.scenario.schema import Scenario
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from estimation.screening import Cause
-from estimation.tracking import Status, Track
+from estimation.tracking.screening import Cause
+from estimation.tracking.tracker import Status, Track
 
 REASONS = {
     Status.INITIALISING: "speed and bearing of the leader not yet known well enough",

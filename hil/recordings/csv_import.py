@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from formation.pose import Motion, Pose
-from hil.certificate import certificate_json, certificate_of
 from hil.emulator.lab_messages import frame_message, odometry_message
 from hil.log.metadata import IMPORT, certificate_metadata, log_metadata
 from hil.log.writer import LogWriter
 from hil.recordings.column_map import ColumnMap
 from hil.recordings.csv_table import Row, read_rows
+from hil.scenario.certificate import certificate_json, certificate_of
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.messages import encode, header, typename_of

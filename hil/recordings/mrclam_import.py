@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 from msgspec.structs import replace
 
+from estimation.calibration.smoothed_track import poses_at, smoothed_motion
 from formation.angles import FloatArray
 from formation.pose import Motion, Pose
-from hil.certificate import certificate_json, certificate_of
 from hil.emulator.lab_messages import frame_message, odometry_message
 from hil.log.metadata import IMPORT, certificate_metadata, log_metadata
 from hil.log.writer import LogWriter
 from hil.recordings.csv_import import Imported
 from hil.recordings.mrclam_folder import Pair, read_pair
-from hil.recordings.smoothed_track import poses_at, smoothed_motion
+from hil.scenario.certificate import certificate_json, certificate_of
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg

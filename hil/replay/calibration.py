@@ -7,13 +7,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.sensor_bias import SensorBias, TooFewSightingsError, find_sensor_bias
+from estimation.calibration.sensor_bias import SensorBias, TooFewSightingsError, find_sensor_bias
+from estimation.calibration.smoothed_track import poses_at
 from formation.angles import FloatArray
 from hil.errors import UsageError
 from hil.log.events import logged_events
 from hil.log.metadata import IMPORT, mode_of
 from hil.log.reader import Log
-from hil.recordings.smoothed_track import poses_at
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.intake import RefusedError, Sighting, read_frame, read_sighting

@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 
-from estimation.estimate import QUANTITIES
-from estimation.tracking import Status
+from estimation.tracking.estimate import QUANTITIES
+from estimation.tracking.tracker import Status
 from hil.errors import UsageError
 from hil.wire.message_types import LeaderEstimate
 from hil.wire.messages import to_ns

@@ -10,12 +10,12 @@ import numpy as np
 from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__PoseStamped as PoseStamped
 
 from hil.errors import UsageError
+from hil.log.events import Timed
 from hil.log.reader import Log, Record
-from hil.nodes.node import Event
-from hil.replay.journal import Timed
 from hil.replay.topic_map import TopicMap
 from hil.wire import message_types as msg
 from hil.wire import topics
+from hil.wire.events import Event
 from hil.wire.messages import MalformedPayloadError, decode_as, encode, header, to_ns, typename_of
 from hil.wire.topics import topics_of
 

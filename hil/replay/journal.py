@@ -11,28 +11,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from hil.nodes.node import TICK, Event, Node, Outgoing, digest
+from hil.log.events import Recorded, Timed
+from hil.nodes.node import Node, Outgoing, digest
+from hil.wire.events import TICK, Event
 
 S = TypeVar("S")
-
-Timed = tuple[Event, int]
-"""An event and the ``now_ns`` at which a node takes it in."""
-
-Receipt = tuple[int, int]
-"""The digest of an input and the ``now_ns`` at which it was taken in."""
-
-
-@dataclass(frozen=True, slots=True)
-class Recorded:
-    """An output as it was logged.
-
-    ``computed_ns``: when it was made, None if its payload cannot be read. ``consumed``: the inputs since the
-    output before, in order.
-    """
-
-    payload: bytes
-    computed_ns: int | None
-    consumed: tuple[Receipt, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

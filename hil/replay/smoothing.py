@@ -6,17 +6,18 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
-from estimation.certified import Certain, Failed
-from estimation.estimate import estimate_of
-from estimation.measurement import Measurement
-from estimation.smoother import smooth
+from estimation.bounds.certified import Certain, Failed
+from estimation.models.measurement import Measurement
+from estimation.tracking.estimate import estimate_of
+from estimation.tracking.smoother import smooth
 from hil.nodes.estimator import NAME, EstimatorNode, EstimatorState
 from hil.nodes.leader_filter import refuse_bias_states
-from hil.nodes.node import Event, Outgoing
+from hil.nodes.node import Outgoing
 from hil.nodes.status_reasons import REASONS
 from hil.scenario.schema import Scenario
 from hil.wire.certified_message import certified_message
 from hil.wire.estimate_message import to_message
+from hil.wire.events import Event
 from hil.wire.message_types import CertifiedEstimate, LeaderEstimate
 
 

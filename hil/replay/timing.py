@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.actuator_response import ActuatorResponse, fit_response
-from estimation.input_alignment import Known
-from hil.judge.own_motion import OwnRecord, own_alignment, own_record
+from estimation.calibration.actuator_response import ActuatorResponse, fit_response
+from estimation.own_motion.input_alignment import Known
 from hil.log.events import logged_events
 from hil.log.metadata import IMPORT, mode_of
 from hil.log.reader import Log
+from hil.replay.odometry_alignment import OwnRecord, own_alignment, own_record
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics

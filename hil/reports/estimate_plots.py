@@ -8,7 +8,7 @@ import numpy as np
 from bokeh.plotting import figure
 from numpy.typing import NDArray
 
-from estimation.estimate import QUANTITIES
+from estimation.tracking.estimate import QUANTITIES
 from formation.angles import FloatArray
 from hil.figures.shown import Shown, broken_at_jumps, outside
 from hil.judge.columns import EstimateColumns, inside

@@ -8,7 +8,7 @@ import numpy as np
 from bokeh.models import ColumnDataSource
 from bokeh.models.glyphs import HBar
 
-from estimation.tracking import Status
+from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
 from hil.figures.shown import LONGEST_LINE, Shown
 from hil.judge.columns import inside

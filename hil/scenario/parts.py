@@ -10,8 +10,8 @@ from controllers.laws import LAWS, Gains
 from controllers.limits import Limits
 from controllers.side_change import gentle
 from controllers.station_keeper import StationKeeper
-from estimation.foresight import Foresight
-from estimation.motion import LeaderLimits, ProcessNoise
+from estimation.models.motion import LeaderLimits, ProcessNoise
+from estimation.tracking.foresight import Foresight
 from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
 from formation.spacing import Spacing
 from formation.station import Side, Station

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.estimate import QUANTITIES
-from hil.report_json import known
+from estimation.tracking.estimate import QUANTITIES
+from hil.log.report_json import known
 from hil.sweep.spec import Cell
 from hil.sweep.tally import BOUNDS
 

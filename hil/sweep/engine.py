@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.estimate import QUANTITIES
+from estimation.tracking.estimate import QUANTITIES
 from formation.leader import Table
 from formation.pose import Pose
 from hil.emulator.mocap import Stream, block_length

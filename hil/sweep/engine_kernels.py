@@ -90,7 +90,7 @@ BELIEF = _fields(
     "x y vx vy u x_x x_y y_y x_vx x_vy y_vx y_vy vx_vx vx_vy vy_vy x_u y_u vx_u vy_u u_u "
     "rho alpha2 rho_dot alpha2_dot heading samples elapsed",
 )
-"""Mean and covariance of the state of :mod:`estimation.motion`, then what only differences remember."""
+"""Mean and covariance of the state of ``estimation.models.motion``, then what only differences remember."""
 
 FRAME = _fields(
     "at_ns lost",
@@ -482,7 +482,7 @@ def _pivot(variance: float) -> tuple[float, float]:
 
 @_compiled()
 def _scaled_root(a: Record, columns: int) -> None:
-    """Columns of the lower triangular root of five times a covariance, as ``estimation.kernels`` has it."""
+    """Columns of the lower triangular root of five times a covariance, as in ``filters.kernels``."""
     p, q, r = _state(columns, 0), _state(columns, 1), _state(columns, 2)
     s, t = _state(columns, 3), _state(columns, 4)
     p.x, scale = _pivot(5.0 * a.x_x)
@@ -1039,7 +1039,7 @@ def _wanted(loop: Record, rules: Record, sent: int, arcs: int, now_ns: int) -> t
 
 @_compiled()
 def _leader_turn(loop: Record, rules: Record, ahead: float) -> float:
-    """The leader's turn rate as told, or as foreseen (``estimation.foresight``)."""
+    """The leader's turn rate as told, or as foreseen (``estimation.tracking.foresight``)."""
     told: float = loop.leader_u1
     if rules.law == IDEAL:
         return told
@@ -1339,7 +1339,7 @@ def _carry_bound(run: Record, k: int, known: bool) -> bool:
 
 @_compiled(from_dtype(RUN)[::1], types.int64, types.boolean[::1], from_dtype(ESTIMATE)[::1])
 def least_variances(runs: Records, first: int, wanted: NDArray[np.bool_], total: Records) -> int:
-    """Sum up the posterior Cramer-Rao bound of ``estimation.cramer_rao`` over frames of a flown run.
+    """Sum up the posterior Cramer-Rao bound (``consistency.cramer_rao``) over frames of a flown run.
 
     The recursion begins at the first frame received from ``first`` on; ``wanted`` tells the frames whose
     variances are added to ``total`` (1,), and their number is returned.

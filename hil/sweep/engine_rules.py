@@ -6,11 +6,11 @@ import math
 
 import msgspec
 
-from estimation.estimators import settling
-from estimation.motion import LeaderLimits, ProcessNoise
-from estimation.tracking import TrackSettings
+from estimation.filters.estimators import settling
+from estimation.models.motion import LeaderLimits, ProcessNoise
+from estimation.tracking.tracker import TrackSettings
 from hil.errors import UsageError
-from hil.nodes.lockstep_run import STOPPING_NS
+from hil.lockstep.run import STOPPING_NS
 from hil.scenario.parts import foresight
 from hil.scenario.schema import ConstantProgram, ImpulseProgram, Scenario, SinusoidProgram
 from hil.sweep import engine_kernels as kernels

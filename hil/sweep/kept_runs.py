@@ -10,9 +10,9 @@ from hil.sweep.spec import Sweep, run_seed
 
 def keep_run(sweep: Sweep, folder: Path, cell: int, run: int) -> Path:
     """Folder with the log, summary and report of a run, which is flown in lockstep with its seed."""
-    from hil.judged_log import judge_log
+    from hil.lockstep.run import run_lockstep
     from hil.log.reader import read_log
-    from hil.nodes.lockstep_run import run_lockstep
+    from hil.reports.judged_log import judge_log
 
     kept = folder / f"cell-{cell}-run-{run}"
     if not (kept / "report.html").exists():

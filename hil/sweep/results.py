@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hil.report_json import write_json
+from hil.log.report_json import write_json
 from hil.sweep.cell_report import report_cell
 from hil.sweep.kept_runs import kept_runs
 from hil.sweep.spec import Sweep, spec_json

@@ -9,10 +9,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.bound_check import QUANTITY_OF
-from estimation.bounds import Perceived
-from estimation.estimate import QUANTITIES
-from estimation.tracking import Status
+from estimation.bounds.bound_check import QUANTITY_OF
+from estimation.bounds.error_bounds import Perceived
+from estimation.tracking.estimate import QUANTITIES
+from estimation.tracking.tracker import Status
 from formation.angles import FloatArray, wrap
 from hil.judge.bounds import judge_bounds
 from hil.judge.columns import Columns, CommandColumns, EstimateColumns, inside

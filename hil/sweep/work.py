@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.certificate import certificate_of
 from hil.errors import UsageError
+from hil.scenario.certificate import certificate_of
 from hil.scenario.files import build_scenario, scenario_text
 from hil.scenario.schema import Scenario
 from hil.sweep.engine import Engine

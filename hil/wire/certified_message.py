@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from estimation.certified import Certain, Failed
-from estimation.estimate import Estimate
+from estimation.bounds.certified import Certain, Failed
+from estimation.tracking.estimate import Estimate
 from hil.wire.message_types import CertifiedEstimate
 from hil.wire.messages import header, to_time
 

@@ -6,15 +6,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from estimation.bounds import InputErrors, Perceived, RateErrors
-from estimation.estimate import Estimate
-from estimation.guarantees import guaranteed_rate, leader_acceleration
-from estimation.live_bounds import ErrorBounds, LawConstants, live_bounds
-from estimation.measurement import PoseNoise
-from estimation.motion import FollowerMotion
-from estimation.own_motion import OwnNoise, steady_noise
-from estimation.screening import NO_DOUBT
-from estimation.tracking import Status
+from estimation.bounds.error_bounds import InputErrors, Perceived, RateErrors
+from estimation.bounds.guarantees import guaranteed_rate, leader_acceleration
+from estimation.bounds.live_bounds import ErrorBounds, LawConstants, live_bounds
+from estimation.models.measurement import PoseNoise
+from estimation.models.motion import FollowerMotion
+from estimation.own_motion.own_track import OwnNoise, steady_noise
+from estimation.tracking.estimate import Estimate
+from estimation.tracking.screening import NO_DOUBT
+from estimation.tracking.tracker import Status
 from formation.spacing import Spacing
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario

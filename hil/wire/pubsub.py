@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import zenoh
 
-from hil.nodes.node import TICK, Event
+from hil.wire.events import TICK, Event
 from hil.wire.topics import STOP
 
 INBOX_LIMIT = 100_000

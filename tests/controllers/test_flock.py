@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from benchmarks.virtual_leader import virtual_leader
 from controllers import flock_kernels as kernels
 from controllers.chain import simulate_chain
 from controllers.flock import Choice, FlockTrajectory, simulate_flock
@@ -24,7 +25,6 @@ from formation.pose import Motion, Pose
 from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2, Shape, shape_of
 from formation.spacing import Spacing
 from formation.station import Side, Station
-from formation.virtual_leader import virtual_leader
 
 MU1, MU2, MU_RHO, SPACING, V1 = 1.0, 2.0, 2.0, 0.5, 0.5
 GAINS = Gains(MU1, MU2, Spacing(SPACING, MU_RHO))

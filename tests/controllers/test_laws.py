@@ -16,10 +16,10 @@ from formation.shape import (
     Shape,
     leader_velocity,
     polar_velocity,
-    reduced_rates,
     shape_rates,
 )
 from formation.spacing import Spacing, lyapunov
+from tests.formation.shape_rates import reduced_rates
 
 angles = st.floats(-math.pi, math.pi, exclude_min=True)
 shapes = st.builds(Shape, st.floats(0.05, 5), angles, angles)

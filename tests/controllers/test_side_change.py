@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from benchmarks.side_change_trial import SETTINGS, Setting, random_run
 from controllers.laws import LAWS, Gains
 from controllers.limits import Limits
 from controllers.side_change import CORRECTION, SideChange, change_step, change_to
 from controllers.side_change_run import run_with_changes
-from controllers.side_change_trial import SETTINGS, Setting, random_run
 from controllers.station_keeper import StationKeeper
 from formation.leader import Constant
 from formation.pose import Pose

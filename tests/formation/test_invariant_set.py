@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from formation.closed_loop import integrate
 from formation.invariant_set import Disturbed, InvariantSet, invariant_set
 from formation.pose import Motion
-from formation.shape import ABREAST_ALPHA1, reduced_rates
+from formation.shape import ABREAST_ALPHA1
 from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
+from tests.formation.shape_rates import reduced_rates
 
 TURTLEBOT3 = Disturbed(1.5, Spacing(0.2, 20.0), SpeedRange(0.08, 0.08), 0.7)
 FIG2 = Disturbed(1.0, Spacing(0.5, 2.0), SpeedRange(0.5, 0.5), 0.7)

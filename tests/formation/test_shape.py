@@ -15,11 +15,10 @@ from formation.shape import (
     follower_pose,
     leader_velocity,
     polar_velocity,
-    reduced_rates,
-    relative_rates,
     shape_of,
     shape_rates,
 )
+from tests.formation.shape_rates import reduced_rates, relative_rates
 
 angles = st.floats(-math.pi, math.pi, exclude_min=True)
 poses = st.builds(Pose, st.floats(-5, 5), st.floats(-5, 5), angles)

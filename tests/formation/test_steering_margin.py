@@ -11,10 +11,11 @@ from formation.invariant_set import Disturbed, invariant_set
 from formation.leader import LeaderProgram, Sinusoid, Table
 from formation.periodic_orbit import find_orbit
 from formation.pose import Motion
-from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2, Shape, reduced_rates
+from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2, Shape
 from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
 from formation.steering_margin import SteeringMargin, steering_margin
+from tests.formation.shape_rates import reduced_rates
 
 MU1, SPACING, V1 = 1.5, Spacing(0.2, 20.0), 0.08
 GAINS = Gains(MU1, 2.0, SPACING)

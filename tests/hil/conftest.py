@@ -7,13 +7,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from estimation.tracking import Status
+from estimation.tracking.tracker import Status
 from formation import pose as plane
 from formation.angles import wrap
 from formation.shape import Shape, follower_pose, shape_of, shape_rates
 from hil.judge.evidence import Evidence, Frames, LogFacts
+from hil.lockstep.run import run_lockstep
 from hil.log.reader import Log, read_log
-from hil.nodes.lockstep_run import run_lockstep
 from hil.scenario.files import load_scenario
 from hil.wire.message_types import (
     CertifiedEstimate,

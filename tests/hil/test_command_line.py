@@ -13,9 +13,9 @@ import pytest
 from hil.command_line import COMMANDS, main
 from hil.errors import UsageError
 from hil.judge.evidence import evidence_of_log
-from hil.judged_log import claimed
+from hil.lockstep.run import run_lockstep
 from hil.log.reader import Log, read_log
-from hil.nodes.lockstep_run import run_lockstep
+from hil.reports.judged_log import claimed
 from hil.scenario.checked_toml import data_folder
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from hil.emulator.node import EmulatorNode
-from hil.nodes.lockstep import EPOCH_NS
-from hil.nodes.node import TICK, Event, Outgoing, diagnostics
+from hil.lockstep.lockstep import EPOCH_NS
+from hil.nodes.node import Outgoing, diagnostics
 from hil.scenario.files import load_scenario
 from hil.scenario.links import links_of
 from hil.wire import message_types as msg
 from hil.wire import topics
+from hil.wire.events import TICK, Event
 from hil.wire.messages import decode_as, encode, header
 
 SCENARIO = load_scenario("chain5-turtlebot3", ["chain.agents=3"])

@@ -9,8 +9,8 @@ from formation.pose import Pose
 from hil.emulator.faults import Pair, faulty, is_active
 from hil.emulator.node import EmulatorNode
 from hil.errors import UsageError
+from hil.lockstep.run import run_lockstep
 from hil.log.reader import read_log
-from hil.nodes.lockstep_run import run_lockstep
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import FaultSection
 from hil.wire import message_types as msg

@@ -9,11 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hil.emulator.node import EmulatorNode, EmulatorState
-from hil.nodes.lockstep import EPOCH_NS
-from hil.nodes.node import TICK, Event, Outgoing, diagnostics
+from hil.lockstep.lockstep import EPOCH_NS
+from hil.nodes.node import Outgoing, diagnostics
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
+from hil.wire.events import TICK, Event
 from hil.wire.messages import decode_as, encode, header, to_ns
 
 MS = 1_000_000

@@ -10,13 +10,13 @@ import pytest
 from hil.judge.assumptions import judge_assumptions
 from hil.judge.columns import columns_of
 from hil.judge.evidence import Evidence
+from hil.judge.replay_verdict import evidence_of_replay
 from hil.log.metadata import scenario_of
 from hil.log.reader import read_log
 from hil.recordings.column_map import load_column_map
 from hil.recordings.csv_import import import_csv
 from hil.replay.calibration import calibrate
 from hil.replay.rerun import replay
-from hil.replay.verdict import evidence_of_replay
 from hil.scenario.files import with_overrides
 from hil.wire.estimate_message import AssumedErrors
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.bounds import Perceived
-from hil.certificate import certificate_of
+from estimation.bounds.error_bounds import Perceived
 from hil.judge.bounds import judge_bounds, worst_errors
 from hil.judge.columns import columns_of
 from hil.judge.evidence import Evidence
+from hil.scenario.certificate import certificate_of
 from hil.wire.estimate_message import AssumedErrors
 
 NAN = math.nan

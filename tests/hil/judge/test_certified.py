@@ -7,10 +7,10 @@ import pytest
 from hil.errors import UsageError
 from hil.judge.certified import certified_violations
 from hil.judge.evidence import Evidence
+from hil.judge.replay_verdict import evidence_of_replay
 from hil.judge.summary import summarise
 from hil.log.reader import Log
 from hil.replay.rerun import replay
-from hil.replay.verdict import evidence_of_replay
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario, with_overrides
 

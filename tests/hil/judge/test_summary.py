@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from estimation.tracking import Status
+from estimation.tracking.tracker import Status
 from hil.judge.evidence import Evidence, evidence_of_log
 from hil.judge.summary import summarise
 from hil.log.metadata import recorded_certificate
 from hil.log.reader import Log
-from hil.report_json import as_json
+from hil.log.report_json import as_json
 from hil.scenario.schema import FormationSection
 from hil.wire.messages import to_ns, to_time
 

@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import json
 
-from hil.certificate import certificate_json, certificate_of
 from hil.live.certificate_process import CertificateProcess
 from hil.log.metadata import CERTIFICATE
-from hil.report_json import known
+from hil.log.report_json import known
+from hil.scenario.certificate import certificate_json, certificate_of
 from hil.scenario.files import load_scenario
 from tests.hil.live.child_run import PATIENCE
 

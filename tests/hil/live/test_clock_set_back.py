@@ -12,16 +12,17 @@ import pytest
 from hil.emulator.node import EmulatorNode
 from hil.live.daemon import NodeWorker
 from hil.live.recorder import Recorder
+from hil.lockstep.lockstep import EPOCH_NS
 from hil.log.reader import read_log
 from hil.nodes.controller import ControllerNode
 from hil.nodes.estimator import EstimatorNode
-from hil.nodes.lockstep import EPOCH_NS
-from hil.nodes.node import TICK, Event, Outgoing
+from hil.nodes.node import Outgoing
 from hil.replay.rerun import replay
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
+from hil.wire.events import TICK, Event
 from hil.wire.messages import decode_as, encode, header, to_ns
 
 S = 1_000_000_000

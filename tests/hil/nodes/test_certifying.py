@@ -10,13 +10,13 @@ from formation.pose import Motion, Pose, advance
 from formation.shape import shape_of
 from hil.emulator.lab_messages import frame_message, odometry_message
 from hil.errors import UsageError
+from hil.lockstep.lockstep import EPOCH_NS
 from hil.nodes.estimator import EstimatorNode
-from hil.nodes.lockstep import EPOCH_NS
-from hil.nodes.node import Event
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
+from hil.wire.events import Event
 from hil.wire.messages import decode_as, encode, header
 
 FRAME_NS = 8_333_333

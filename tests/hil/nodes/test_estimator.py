@@ -10,20 +10,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimation.estimators import ESTIMATORS
-from estimation.tracking import Status
+from estimation.filters.estimators import ESTIMATORS
+from estimation.tracking.tracker import Status
 from formation.pose import Motion, Pose, advance
 from formation.shape import shape_of
 from hil.emulator.lab_messages import frame_message, odometry_message
+from hil.lockstep.lockstep import EPOCH_NS
+from hil.lockstep.run import run_lockstep
 from hil.log.reader import read_log
 from hil.nodes.estimator import EstimatorNode, EstimatorState
-from hil.nodes.lockstep import EPOCH_NS
-from hil.nodes.lockstep_run import run_lockstep
-from hil.nodes.node import TICK, Event, Outgoing, digest
+from hil.nodes.node import Outgoing, digest
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import EstimatorName
 from hil.wire import message_types as msg
 from hil.wire import topics
+from hil.wire.events import TICK, Event
 from hil.wire.messages import decode_as, encode, header, to_ns
 
 FRAME_NS = 8_333_333

@@ -6,21 +6,21 @@ from typing import Any
 
 import pytest
 
-from estimation.tracking import Status
+from estimation.tracking.tracker import Status
 from formation.pose import Motion, Pose, advance
 from hil.emulator.lab_messages import frame_message, odometry_message
 from hil.errors import UsageError
 from hil.judge.evidence import evidence_of_log
 from hil.judge.summary import summarise
+from hil.lockstep.lockstep import EPOCH_NS
+from hil.lockstep.run import run_lockstep
 from hil.log.reader import Log, read_log
 from hil.nodes.estimator import EstimatorNode, EstimatorState
-from hil.nodes.lockstep import EPOCH_NS
-from hil.nodes.lockstep_run import run_lockstep
-from hil.nodes.node import Event
 from hil.replay.rerun import replay
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
+from hil.wire.events import Event
 from hil.wire.messages import decode_as, encode, to_ns
 
 FRAME_NS = 8_333_333

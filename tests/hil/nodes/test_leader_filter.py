@@ -8,10 +8,10 @@ from hil.emulator.lab_messages import odometry_message
 from hil.errors import UsageError
 from hil.nodes.estimator import EstimatorNode
 from hil.nodes.leader_filter import leader_filter
-from hil.nodes.node import Event
 from hil.replay.smoothing import ListeningEstimator
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
+from hil.wire.events import Event
 from hil.wire.messages import decode_as, encode, header
 
 START_NS = 1_000_000_000

@@ -7,16 +7,16 @@ import math
 import numpy as np
 import pytest
 
-from estimation.odometry_correction import IDEAL
+from estimation.own_motion.odometry_correction import IDEAL
 from formation.pose import Motion, Pose, advance
 from hil.emulator.lab_messages import frame_message, odometry_message
+from hil.lockstep.lockstep import EPOCH_NS, Lockstep
+from hil.lockstep.run import make_nodes
 from hil.nodes.estimator import EstimatorNode, EstimatorState
-from hil.nodes.lockstep import EPOCH_NS, Lockstep
-from hil.nodes.lockstep_run import make_nodes
-from hil.nodes.node import Event
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
+from hil.wire.events import Event
 from hil.wire.messages import decode_as, encode, to_ns
 
 STEP_NS = 33_333_333

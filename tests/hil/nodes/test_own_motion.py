@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from estimation.tracking import Status
+from estimation.tracking.tracker import Status
 from formation.pose import Motion, Pose, advance
 from hil.emulator.lab_messages import frame_message, odometry_message
+from hil.lockstep.lockstep import EPOCH_NS
 from hil.nodes.estimator import EstimatorNode, EstimatorState
-from hil.nodes.lockstep import EPOCH_NS
-from hil.nodes.node import Event
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
+from hil.wire.events import Event
 from hil.wire.messages import decode_as, encode
 
 FRAME_NS = 8_333_333

@@ -13,9 +13,9 @@ from formation.angles import wrap
 from formation.pose import Pose
 from formation.shape import shape_of
 from hil.errors import UsageError
+from hil.lockstep.run import run_lockstep
 from hil.log.metadata import mode_of, scenario_of
 from hil.log.reader import Log, read_log
-from hil.nodes.lockstep_run import run_lockstep
 from hil.recordings.column_map import load_column_map
 from hil.recordings.csv_import import import_csv
 from hil.replay.rerun import Replay, replay

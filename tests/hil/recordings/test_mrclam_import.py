@@ -10,13 +10,13 @@ import pytest
 from formation.pose import Pose, advance
 from hil.command_line import main
 from hil.errors import UsageError
-from hil.judge.own_motion import judge_own_motion
+from hil.judge.replay_verdict import evidence_of_replay
 from hil.judge.summary import summarise
 from hil.log.metadata import mode_of, scenario_of
 from hil.log.reader import Log, read_log
 from hil.recordings.mrclam_import import import_mrclam
+from hil.replay.odometry_alignment import judge_own_motion
 from hil.replay.rerun import replay
-from hil.replay.verdict import evidence_of_replay
 from hil.scenario.files import load_scenario, with_overrides
 from hil.wire import topics
 from hil.wire.message_types import Odometry, RigidBodies, Truth

@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.sensor_bias import SensorBias
+from estimation.calibration.sensor_bias import SensorBias
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
 from formation.shape import shape_of
 from hil.errors import UsageError
+from hil.judge.replay_verdict import evidence_of_replay
 from hil.judge.summary import summarise
 from hil.log.metadata import scenario_of
 from hil.log.reader import Log, read_log
@@ -19,7 +20,6 @@ from hil.recordings.column_map import load_column_map
 from hil.recordings.csv_import import import_csv
 from hil.replay.calibration import calibrate
 from hil.replay.rerun import replay
-from hil.replay.verdict import evidence_of_replay
 from hil.scenario.files import with_overrides
 from hil.scenario.schema import Scenario
 

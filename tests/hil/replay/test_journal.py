@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil.nodes.node import Event, Outgoing, digest
-from hil.replay.journal import Journey, Recorded, feed, index_by_digest, parity_of, refeed
+from hil.log.events import Recorded
+from hil.nodes.node import Outgoing, digest
+from hil.replay.journal import Journey, feed, index_by_digest, parity_of, refeed
+from hil.wire.events import Event
 
 PERIOD_NS = 50
 

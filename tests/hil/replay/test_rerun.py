@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from hil.errors import UsageError
+from hil.judge.replay_verdict import why_not_same
+from hil.lockstep.lockstep import EPOCH_NS
+from hil.lockstep.run import run_lockstep
 from hil.log.metadata import log_metadata, scenario_of
 from hil.log.reader import Log, Record, read_log
 from hil.log.writer import LogWriter
-from hil.nodes.lockstep import EPOCH_NS
-from hil.nodes.lockstep_run import run_lockstep
 from hil.replay.journal import Parity
 from hil.replay.rerun import Replay, replay
-from hil.replay.verdict import why_not_same
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario, with_overrides
 from hil.wire import topics

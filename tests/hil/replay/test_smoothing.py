@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from click import Command
 
-from estimation.tracking import Status
+from estimation.tracking.tracker import Status
 from hil.commands import run
 from hil.commands.replay import command as replay_command
 from hil.errors import UsageError
+from hil.judge.replay_verdict import evidence_of_replay
 from hil.judge.summary import summarise
+from hil.lockstep.run import run_lockstep
 from hil.log.metadata import scenario_of
 from hil.log.reader import Log, read_log
 from hil.nodes.estimator import EstimatorNode
-from hil.nodes.lockstep_run import run_lockstep
 from hil.replay.rerun import Replay, replay
-from hil.replay.verdict import evidence_of_replay
 from hil.scenario.files import load_scenario, with_overrides
 from hil.wire.message_types import LeaderEstimate
 from hil.wire.messages import to_ns

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from estimation.actuator_response import ActuatorResponse
-from estimation.input_alignment import Known
+from estimation.calibration.actuator_response import ActuatorResponse
+from estimation.own_motion.input_alignment import Known
 from hil.command_line import main
+from hil.lockstep.run import run_lockstep
 from hil.log.metadata import log_metadata
 from hil.log.reader import read_log
 from hil.log.writer import LogWriter
-from hil.nodes.lockstep_run import run_lockstep
 from hil.replay.rerun import replay
 from hil.replay.timing import Timing, timing_of
 from hil.scenario.files import load_scenario

@@ -14,7 +14,7 @@ import msgspec
 import pytest
 from selenium.webdriver import Chrome
 
-from estimation.tracking import Status
+from estimation.tracking.tracker import Status
 from hil.figures.shown import Shown
 from hil.judge.evidence import Evidence, evidence_of_log
 from hil.judge.summary import summarise

@@ -9,7 +9,7 @@ from typing import Any, get_args
 from msgspec import Struct
 from msgspec.structs import fields
 
-from estimation.estimators import ESTIMATORS
+from estimation.filters.estimators import ESTIMATORS
 from hil.scenario.schema import OFFLINE_ESTIMATORS, EstimatorName, Scenario
 
 KEYS = Path(__file__).parents[3] / "docs" / "scenario.md"

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.cramer_rao import TruePath, cramer_rao
-from estimation.estimate import QUANTITIES
-from estimation.measurement import PoseNoise
+from estimation.consistency.cramer_rao import TruePath, cramer_rao
+from estimation.models.measurement import PoseNoise
+from estimation.tracking.estimate import QUANTITIES
 from formation.angles import wrap
 from hil.errors import CheckFailedError, UsageError
+from hil.lockstep.lockstep import EPOCH_NS
+from hil.lockstep.run import run_lockstep
 from hil.log.reader import read_log
 from hil.nodes.estimator import EstimatorNode
-from hil.nodes.lockstep import EPOCH_NS
-from hil.nodes.lockstep_run import run_lockstep
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
 from hil.sweep.engine import Engine

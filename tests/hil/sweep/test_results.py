@@ -17,8 +17,8 @@ from pyarrow import parquet
 from hil.errors import UsageError
 from hil.judge.evidence import evidence_of_log
 from hil.judge.summary import summarise
+from hil.lockstep.run import run_lockstep
 from hil.log.reader import read_log
-from hil.nodes.lockstep_run import run_lockstep
 from hil.sweep.kept_runs import keep_run, worst_runs
 from hil.sweep.results import fly_sweep, write_results
 from hil.sweep.spec import Sweep, run_seed

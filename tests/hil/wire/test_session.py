@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from hil.errors import AbreastError, UsageError
-from hil.nodes.node import Event
+from hil.wire.events import Event
 from hil.wire.pubsub import INBOX_LIMIT, Inbox, Wire
 from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
 

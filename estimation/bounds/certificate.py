@@ -1,0 +1,241 @@
+"""The certificate: from noise bounds and leader limits to what is guaranteed of estimates and formation.
+
+Every claim says what it rests on, and where nothing can be claimed, why. The chain: a bound eps of the noise
+and a bound A of the leader's acceleration give the error W of its velocity, in any direction, that the best
+window estimator guarantees; W gives the bounds on rates, on v1 and alpha1, and on h; the rate of alpha2 its
+ultimate bound; the leader's turn rate the invariant set of (rho, alpha1), without and with the errors of h.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+
+from estimation.bounds.error_bounds import Perceived, RateErrors, paper_h, sound_h
+from estimation.bounds.guarantees import alpha2_ultimate, guaranteed_rate
+from estimation.bounds.premises import Premises
+from formation.angles import FloatArray
+from formation.invariant_set import Disturbed, InvariantSet, invariant_set
+from formation.speed_range import SpeedRange
+from formation.station import Side
+from formation.steering_margin import steering_margin
+
+_GRID = 33
+_ROUNDS = 50
+_SETTLED = 1e-6
+
+MANIFOLD = "the reduced system (5), that is alpha2 at rest, under law (8), without limits or lag"
+START = "a start inside the set"
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """Guaranteed figures by name (none if nothing is guaranteed), what they rest on, and why some miss."""
+
+    figures: dict[str, float] = field(default_factory=dict)
+    assumes: tuple[str, ...] = ()
+    why: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """All claims; ``velocity_error``: guaranteed error W of the leader's velocity [m/s] in any direction."""
+
+    velocity_error: float
+    rates: Claim
+    estimates: Claim
+    h: Claim
+    alpha2_ultimate: Claim
+    formation: Claim
+    formation_any_speed: Claim
+    formation_with_errors: Claim
+    k_u_star: Claim
+
+    def claims(self) -> dict[str, Claim]:
+        """Claims by name, in the order in which they follow from each other."""
+        names = [name for name in self.__slots__ if name != "velocity_error"]
+        return {name: getattr(self, name) for name in names}
+
+
+@lru_cache(maxsize=32)
+def certify(given: Premises) -> Certificate:
+    """Certificate of a pair and its leader; takes some tenths of a second, the first time."""
+    velocity_error = given.velocity_error
+    system = Disturbed(given.mu1, given.spacing, given.speeds, given.k_u)
+    held = None if given.unproved else invariant_set(system)
+    rates = _rates(given, velocity_error, held)
+    return Certificate(
+        velocity_error=velocity_error,
+        rates=rates,
+        estimates=_estimates(given, velocity_error),
+        h=_h(given, velocity_error, held),
+        alpha2_ultimate=_alpha2_ultimate(given, rates.figures["M_alpha2"]),
+        formation=_formation(given, system, held, "exact estimates"),
+        formation_any_speed=_formation_any_speed(given, system),
+        formation_with_errors=_formation_with_errors(given, velocity_error, system, held),
+        k_u_star=_k_u_star(given),
+    )
+
+
+def _sources(given: Premises) -> tuple[str, ...]:
+    return (
+        f"noise: {given.noise}",
+        f"v1 <= k_v = {given.k_v:g} m/s at constant speed and |u1| <= k_u = {given.k_u:g} rad/s, "
+        f"so that the leader accelerates by at most {given.acceleration:.3g} m/s^2",
+        f"a measurement every {1e3 * given.step:.3g} ms over the window, none missing",
+        "the estimator of the window's linear program; a Kalman filter does better, unguaranteed",
+    )
+
+
+def _rates(given: Premises, velocity_error: float, held: InvariantSet | None) -> Claim:
+    nearest, which = _nearest(given, held)
+    figures = {
+        "M_rho": velocity_error,
+        "M_alpha2": velocity_error / nearest,
+        "closed_form": float(guaranteed_rate(given.eps, given.acceleration)),
+        "eps": given.eps,
+        "acceleration": given.acceleration,
+    }
+    own = "the follower's own pose and motion are exact (the appendix of the paper)"
+    return Claim(figures, (*_sources(given), own, f"rho >= {nearest:.3g} m ({which})"))
+
+
+def _nearest(given: Premises, held: InvariantSet | None) -> tuple[float, str]:
+    if held is None:
+        return given.spacing.rho_0, "the desired distance, as no set is certified"
+    return held.rho_min, "least distance of the certified formation"
+
+
+def _estimates(given: Premises, velocity_error: float) -> Claim:
+    assumes = (*_sources(given), f"v1 >= v_eps = {given.v_eps:g} m/s")
+    if given.v_eps <= velocity_error:
+        why = (
+            f"M_alpha1: the velocity's error {velocity_error:.3g} m/s reaches v_eps = {given.v_eps:g} m/s, "
+            "so that any direction is possible"
+        )
+        return Claim({"M_v1": velocity_error}, assumes, why)
+    return Claim({"M_v1": velocity_error, "M_alpha1": math.asin(velocity_error / given.v_eps)}, assumes)
+
+
+def _h(given: Premises, velocity_error: float, held: InvariantSet | None) -> Claim:
+    rho, alpha1 = _states(given, velocity_error, held)
+    where = "rho_0 and alpha1 at its station" if held is None else "the certified formation"
+    paper, sound = _h_bounds(given, velocity_error, rho, alpha1)
+    assumes = (*_sources(given), f"v1 >= v_eps = {given.v_eps:g} m/s", f"worst over {where}")
+    return Claim({"paper": float(paper.max()), "sound": float(sound.max())}, assumes)
+
+
+def _h_bounds(
+    given: Premises, velocity_error: float, rho: FloatArray, alpha1: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Bounds of h in the paper's and the sound form at believed states.
+
+    Both rate errors come from one error W of the velocity, so that M = W: in the sound form all of it may lie
+    across the line between the robots, and the part along that line adds nothing then.
+    """
+    seen = Perceived(rho, 0.5 * math.pi, 0.0, 0.0, given.v_eps, alpha1, 0.0, 0.0)
+    printed = paper_h(seen, RateErrors(velocity_error, velocity_error / rho), given.mu1, given.spacing)
+    sound = sound_h(seen, RateErrors(0.0, velocity_error / rho), given.v_eps, given.mu1, given.spacing)
+    return printed, sound
+
+
+def _states(
+    given: Premises, velocity_error: float, held: InvariantSet | None
+) -> tuple[FloatArray, FloatArray]:
+    """Distances and believed bearings of the certified set, or of the equilibrium without one."""
+    wrong = math.asin(velocity_error / given.v_eps) if given.v_eps > velocity_error else math.pi
+    if held is None:
+        return np.full(_GRID, given.spacing.rho_0), -0.5 * math.pi + np.linspace(-wrong, wrong, _GRID)
+    rho = np.linspace(held.rho_min, held.rho_max, _GRID)
+    lowest, highest = held.span(rho)
+    share = np.linspace(0.0, 1.0, _GRID)[:, np.newaxis]
+    alpha1 = (1.0 - share) * (lowest - wrong) + share * (highest + wrong)
+    return np.broadcast_to(rho, alpha1.shape), alpha1
+
+
+def _alpha2_ultimate(given: Premises, M_alpha2: float) -> Claim:
+    assumes = (
+        f"|alpha2_dot error| <= M_alpha2 = {M_alpha2:.3g} rad/s",
+        "steering law (4), carried out at once",
+    )
+    if M_alpha2 >= given.mu2:
+        why = (
+            f"M_alpha2 = {M_alpha2:.3g} rad/s >= mu2 = {given.mu2:g} rad/s: "
+            "the error can outweigh the steering"
+        )
+        return Claim({}, assumes, why)
+    return Claim({"value": float(alpha2_ultimate(M_alpha2, given.mu2))}, assumes)
+
+
+def _formation(given: Premises, system: Disturbed, held: InvariantSet | None, besides: str) -> Claim:
+    speeds = system.speeds
+    drives = (
+        f"v1 = {speeds.lowest:g} m/s, constant"
+        if speeds.lowest == speeds.highest
+        else f"v1 anywhere between {speeds.lowest:g} and {speeds.highest:g} m/s"
+    )
+    assumes = (f"|u1| <= k_u = {given.k_u:g} rad/s", drives, besides, MANIFOLD, START)
+    if held is None:
+        return Claim({}, assumes, given.unproved or _why_not_held(given, system))
+    # The left is the right's mirror image, which changes the sign of every bearing.
+    low, high = (held.alpha1_min, held.alpha1_max)
+    if given.side is Side.LEFT:
+        low, high = -high, -low
+    figures = {"rho_min": held.rho_min, "rho_max": held.rho_max, "alpha1_min": low, "alpha1_max": high}
+    return Claim(figures, assumes)
+
+
+def _why_not_held(given: Premises, system: Disturbed) -> str:
+    reach = given.spacing.mu_rho * system.speeds.lowest
+    if reach <= system.D:
+        return (
+            f"a constant turn of {system.D:.3g} rad/s is not below mu_rho v1 = {reach:.3g} rad/s: "
+            "no distance balances it"
+        )
+    return f"the worst steering within {system.D:.3g} rad/s carries alpha1 past its saddle"
+
+
+def _formation_any_speed(given: Premises, system: Disturbed) -> Claim:
+    any_speed = replace(system, speeds=SpeedRange(given.v_eps, given.k_v))
+    held = None if given.unproved else invariant_set(any_speed)
+    return _formation(given, any_speed, held, "exact estimates")
+
+
+def _formation_with_errors(
+    given: Premises, velocity_error: float, system: Disturbed, held: InvariantSet | None
+) -> Claim:
+    """The set for D = k_u + the largest bound of h within it: enlarged until it holds for itself."""
+    besides = "estimates as wrong as the sound bound of h allows"
+    disturbed = system
+    for _ in range(_ROUNDS):
+        if held is None:
+            return _formation(given, disturbed, None, besides)
+        error = float(_h_bounds(given, velocity_error, *_states(given, velocity_error, held))[1].max())
+        enlarged = given.k_u + error
+        if abs(enlarged - disturbed.D) <= _SETTLED:
+            return _formation(given, disturbed, held, f"{besides}, {error:.3g} rad/s")
+        disturbed = replace(disturbed, D=enlarged + 0.5 * _SETTLED)
+        held = invariant_set(disturbed)
+    return Claim({}, (besides,), "the set and the error of h within it keep enlarging each other")
+
+
+def _k_u_star(given: Premises) -> Claim:
+    speeds = given.speeds
+    assumes = ("exact estimates", MANIFOLD, f"v1 = {speeds.lowest:g} m/s, constant")
+    if given.unproved:
+        return Claim({}, assumes, given.unproved)
+    if speeds.lowest != speeds.highest:
+        why = (
+            "Prop. 3 is about a leader of constant speed; "
+            f"this one drives {speeds.lowest:g} to {speeds.highest:g} m/s"
+        )
+        return Claim({}, (*assumes[:2], "a constant v1"), why)
+    margin = steering_margin(given.mu1, given.spacing, speeds.lowest)
+    lower = (
+        "lower: below it one stable orbit in the invariant set is proved (contraction in a constant metric)"
+    )
+    upper = "upper: above it a periodic steering is known that throws the pair off"
+    return Claim({"lower": margin.lower, "upper": margin.upper}, (*assumes, lower, upper))

@@ -1,0 +1,46 @@
+"""What a certificate starts from, and the first thing that follows: how wrong a velocity can be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from estimation.bounds.guarantees import leader_acceleration
+from estimation.bounds.window_estimator import window_estimator
+from formation.spacing import Spacing
+from formation.speed_range import SpeedRange
+from formation.station import Side
+
+
+@dataclass(frozen=True, slots=True)
+class Premises:
+    """What a certificate starts from.
+
+    ``eps``: bound of the error of each measured leader position, in any direction [m]. ``step``: time between
+    two measurements [s]. Of the leader v_eps <= v1 <= k_v [m/s] and |u1| <= k_u [rad/s]; ``speeds``: the
+    speeds that it will really drive, for the formation. Of the law mu1, mu2 [rad/s] and the spacing.
+    ``noise``: in words, where eps comes from. ``side`` that the follower drives on. ``unproved``: why the
+    theory of the formation does not speak of this pair, empty if it does.
+    """
+
+    eps: float
+    step: float
+    v_eps: float
+    k_v: float
+    k_u: float
+    speeds: SpeedRange
+    mu1: float
+    mu2: float
+    spacing: Spacing
+    noise: str
+    side: Side = Side.RIGHT
+    unproved: str = ""
+
+    @property
+    def acceleration(self) -> float:
+        """Bound A of the leader's acceleration [m/s^2]."""
+        return float(leader_acceleration(self.k_v, self.k_u))
+
+    @property
+    def velocity_error(self) -> float:
+        """Guaranteed error W of the leader's velocity [m/s], by the best window estimator."""
+        return window_estimator(self.eps, self.acceleration, self.step).bound

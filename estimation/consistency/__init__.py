@@ -1,0 +1,1 @@
+"""Whether an estimator's errors are what they can be at best."""

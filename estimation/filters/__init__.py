@@ -1,0 +1,1 @@
+"""Estimators of the leader's motion, each behind one protocol, and the table of their names."""

@@ -1,0 +1,1 @@
+"""What moves and what is measured: the leader's motion, its disturbance, and the sensors."""

@@ -1,0 +1,114 @@
+"""Odometry that comes late or falls short, put right by what the follower's own mocap track shows.
+
+Delay and scales are those of :func:`estimation.own_motion.input_alignment.align_odometry`, over the last half
+minute and of the odometry as it came, so that a correction never feeds back into what it is estimated from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.own_motion.input_alignment import UNKNOWN, Alignment, Known, align_odometry
+from estimation.own_motion.inputs import MotionSample
+from formation.pose import Pose
+
+SPAN_NS = 30_000_000_000
+"""How far back is looked."""
+
+EVERY_NS = 1_000_000_000
+"""How often."""
+
+_THINNED_NS = 30_000_000  # between two poses or samples that are kept
+_SURE = 4.0  # standard deviations off the ideal, before a correction begins
+_LEAST_DELAY = 0.02  # [s]; below this nothing is worth correcting
+_LEAST_SCALE = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """``motion(t) = scale * odometry(t - delay)`` as it is applied; delay in [s]."""
+
+    delay: float = 0.0
+    scale_v: float = 1.0
+    scale_u: float = 1.0
+
+
+IDEAL = Correction()
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """What alignment rests on, thinned: poses (capture_ns, pose) and samples of odometry.
+
+    ``found``: what it let know last; ``applied``: what odometry is corrected by.
+    """
+
+    poses: tuple[tuple[int, Pose], ...] = ()
+    samples: tuple[MotionSample, ...] = ()
+    found: Alignment = UNKNOWN
+    applied: Correction = IDEAL
+    next_ns: int = 0
+
+
+NOTHING_SEEN = Watch()
+
+
+def with_pose(watch: Watch, capture_ns: int, pose: Pose) -> Watch:
+    """Watch with a mocap pose of the follower, if it is new and not too close to the one before."""
+    poses = watch.poses
+    if poses and capture_ns < poses[-1][0] + _THINNED_NS:
+        return watch
+    first = 0
+    while first < len(poses) and poses[first][0] < capture_ns - SPAN_NS:
+        first += 1
+    return replace(watch, poses=(*poses[first:], (capture_ns, pose)))
+
+
+def with_sample(watch: Watch, sample: MotionSample) -> Watch:
+    """Watch with a sample of odometry, if it is new and not too close to the one before."""
+    samples = watch.samples
+    if samples and sample.stamp_ns < samples[-1].stamp_ns + _THINNED_NS:
+        return watch
+    first = 0
+    while first < len(samples) and samples[first].stamp_ns < sample.stamp_ns - SPAN_NS:
+        first += 1
+    return replace(watch, samples=(*samples[first:], sample))
+
+
+def reconsidered(watch: Watch, now_ns: int) -> Watch:
+    """Watch after a look at what it holds, once a second.
+
+    A correction begins where the odometry is off by more than 20 ms or 2 % and by four standard deviations,
+    and follows every later finding until that is within half of this; what is no longer known stays.
+    """
+    if now_ns < watch.next_ns:
+        return watch
+    watch = replace(watch, next_ns=now_ns + EVERY_NS)
+    if len(watch.poses) < 2 or len(watch.samples) < 2:
+        return watch
+    zero_ns = watch.poses[0][0]
+    found = align_odometry(
+        np.array([(at_ns - zero_ns) * 1e-9 for at_ns, _ in watch.poses]),
+        np.array([(pose.x, pose.y, pose.theta) for _, pose in watch.poses]),
+        np.array([(sample.stamp_ns - zero_ns) * 1e-9 for sample in watch.samples]),
+        np.array([(sample.v2, sample.u2) for sample in watch.samples]),
+    )
+    before = watch.applied
+    applied = Correction(
+        _applied(found.delay, before.delay, 0.0, _LEAST_DELAY),
+        _applied(found.scale_v, before.scale_v, 1.0, _LEAST_SCALE),
+        _applied(found.scale_u, before.scale_u, 1.0, _LEAST_SCALE),
+    )
+    return replace(watch, found=found, applied=applied)
+
+
+def _applied(found: Known | None, before: float, ideal: float, least: float) -> float:
+    if found is None:
+        return before
+    off = abs(found.value - ideal)
+    if before == ideal:
+        begins = off > least and off > _SURE * found.sd
+        return found.value if begins else ideal
+    return found.value if off > 0.5 * least else ideal

@@ -1,0 +1,1 @@
+"""Clocks: the mocap's against the host's."""

@@ -1,0 +1,1 @@
+"""From frames to an estimate: screening, gate, re-acquisition, late frames, prediction, smoothing."""

@@ -1,0 +1,69 @@
+"""The best that a whole log allows: a filter forward in time, then a pass backward that knows the future.
+
+Rauch, Tung and Striebel, AIAA Journal 3(8), 1965, with the Jacobians of the motion at the filtered states.
+For reference tracks out of a log; of no use to a follower that has to act now.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.filters.belief import Belief
+from estimation.models.measurement import Measurement
+from estimation.models.motion import STATE_SIZE
+from estimation.own_motion.inputs import mean_motion
+from estimation.tracking.tracker import Tracker, TrackPoint, Verdict
+
+_NS = 1e-9
+
+
+def smooth(tracker: Tracker, measurements: Iterable[Measurement]) -> tuple[TrackPoint, ...]:
+    """Fold a whole track, in any order and with duplicates, and smooth it.
+
+    ``tracker`` folds with a filter on the coordinated turn, as ``ekf`` is: its beliefs are those of the
+    model. Points come in the order of capture times; verdict, NIS and time of the newest measurement used are
+    those of the forward pass, the belief is the smoothed one, and whether the track is settled follows from
+    it. A restart parts the track: nothing is carried back over it.
+    """
+    forward = _forward(tracker, measurements)
+    backward: list[TrackPoint] = []
+    for point in reversed(forward):
+        if backward and backward[-1].verdict is not Verdict.RESTARTED:
+            point = replace(point, belief=_carried_back(tracker, point, backward[-1]))
+        backward.append(point)
+    smoothed: list[TrackPoint] = []
+    for point in reversed(backward):
+        before = bool(smoothed) and smoothed[-1].settled and point.verdict is not Verdict.RESTARTED
+        smoothed.append(replace(point, settled=tracker.settled(point.belief, before), candidate=None))
+    return tuple(smoothed)
+
+
+def _forward(tracker: Tracker, measurements: Iterable[Measurement]) -> list[TrackPoint]:
+    by_capture = {each.capture_ns: each for each in measurements}
+    points: list[TrackPoint] = []
+    for capture_ns in sorted(by_capture):
+        due = by_capture[capture_ns]
+        points.append(tracker.follow(points[-1], due) if points else tracker.begin(due))
+    return points
+
+
+def _carried_back(tracker: Tracker, here: TrackPoint, later: TrackPoint) -> Belief:
+    """Belief at a point from its filtered one and the smoothed one of the next.
+
+    With G = P F^T (F P F^T + Q)^-1 the covariance is (I - G F) P (I - G F)^T + G (Q + P_later) G^T: the
+    textbook's P + G (P_later - P_prior) G^T, written as a sum of squares that stays positive definite.
+    """
+    model, filtered = tracker.estimator.model, here.belief
+    dt = (later.measurement.capture_ns - here.measurement.capture_ns) * _NS
+    follower = mean_motion(here.measurement.motion, later.measurement.motion)
+    move = model.transition(filtered.mean, dt, follower)
+    noise = model.process_noise(filtered.mean, dt, follower)
+    foreseen = move @ filtered.covariance @ move.T + noise
+    gain = np.linalg.solve(foreseen, move @ filtered.covariance).T
+    change = later.belief.mean - model.propagate(filtered.mean, dt, follower)
+    rest = np.eye(STATE_SIZE) - gain @ move
+    covariance = rest @ filtered.covariance @ rest.T + gain @ (noise + later.belief.covariance) @ gain.T
+    return Belief(filtered.mean + gain @ change, 0.5 * (covariance + covariance.T))

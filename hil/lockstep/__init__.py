@@ -1,0 +1,1 @@
+"""Lockstep: all nodes in one process on a simulated clock."""

@@ -1,0 +1,66 @@
+"""A whole run in lockstep: emulator, estimators and controllers on a simulated clock, into a log."""
+
+from __future__ import annotations
+
+import gc
+from pathlib import Path
+from typing import Any
+
+from hil.emulator.node import EmulatorNode, EmulatorState
+from hil.errors import CheckFailedError
+from hil.lockstep.lockstep import EPOCH_NS, Lockstep
+from hil.log.metadata import certificate_metadata, log_metadata
+from hil.log.writer import LogWriter
+from hil.nodes.link_nodes import controller_node, estimator_node
+from hil.nodes.node import Node, Outgoing, outgoing
+from hil.scenario.certificate import certificate_json, certificate_of
+from hil.scenario.links import links_of
+from hil.scenario.schema import Scenario
+from hil.wire import topics
+from hil.wire.message_types import String
+from hil.wire.messages import prepare
+
+START_TIMEOUT_NS = 10_000_000_000
+STOPPING_NS = 600_000_000
+"""Time given to the robots to come to rest after the stop, so that the log shows that they did."""
+
+
+def make_nodes(scenario: Scenario) -> list[Node[Any]]:
+    """The nodes of a run; making them loads and compiles all that they need."""
+    prepare(topics.types_of(scenario).values())
+    links = links_of(scenario)
+    return [EmulatorNode(scenario), *map(estimator_node, links), *map(controller_node, links)]
+
+
+def run_lockstep(scenario: Scenario, log_path: Path, nodes: list[Node[Any]] | None = None) -> None:
+    """Run a scenario from the start barrier to standstill and write everything to ``log_path``.
+
+    ``nodes``: those of :func:`make_nodes`, if they have been made before. Raises :class:`CheckFailedError`
+    if the leader never sets off.
+    """
+    certificate = certificate_metadata(certificate_json(certificate_of(scenario)))
+    with LogWriter(log_path, log_metadata(scenario, "lockstep") | certificate) as log:
+
+        def record(message: Outgoing, now_ns: int) -> None:
+            log.write(message.topic, message.typename, message.payload, now_ns, now_ns)
+
+        lockstep = Lockstep(nodes or make_nodes(scenario), record)
+        # What was imported and built so far stays for good: the collector need not walk it again and again.
+        gc.freeze()
+        since_ns = _wait_for_motion(lockstep)
+        lockstep.run_until(since_ns + round(scenario.run.duration_s * 1e9))
+        lockstep.publish(outgoing(topics.STOP, String(data="end of run"), lockstep.now_ns))
+        lockstep.run_until(lockstep.now_ns + STOPPING_NS)
+        lockstep.farewell()
+
+
+def _wait_for_motion(lockstep: Lockstep) -> int:
+    while lockstep.now_ns < EPOCH_NS + START_TIMEOUT_NS:
+        lockstep.run_until(lockstep.now_ns + 10_000_000)
+        state = lockstep.state_of("emulator")
+        if isinstance(state, EmulatorState) and state.motion_since_ns is not None:
+            return state.motion_since_ns
+    raise CheckFailedError(
+        f"the start barrier did not open within {START_TIMEOUT_NS * 1e-9:g} s of simulated time; "
+        "a follower gets no frames or no odometry: check mocap.loss, mocap.latency_s and the rates"
+    )

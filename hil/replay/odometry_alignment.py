@@ -1,0 +1,81 @@
+"""How the follower's odometry compares with its own mocap track: its delay and its scales."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.own_motion.input_alignment import UNKNOWN, Alignment, align_odometry
+from estimation.time.host_time import HostTime
+from hil.log.reader import Log
+from hil.nodes.frame_time import FrameTime
+from hil.scenario.schema import Scenario
+from hil.wire import topics
+from hil.wire.intake import RefusedError, read_frame, read_odometry
+from hil.wire.topics import topics_of
+
+
+@dataclass(frozen=True, slots=True)
+class OwnRecord:
+    """What a log holds of the follower's motion.
+
+    ``poses``: x, y [m], theta [rad] by capture time on the host's clock [ns]. ``motions``: v2 [m/s],
+    u2 [rad/s] of odometry by its stamp [ns].
+    """
+
+    poses: Mapping[int, tuple[float, float, float]]
+    motions: Mapping[int, tuple[float, float]]
+
+
+def own_record(log: Log, scenario: Scenario) -> OwnRecord:
+    """Poses and odometry of a scenario's follower, without what an estimator would refuse."""
+    names = topics_of(scenario)
+    poses: dict[int, tuple[float, float, float]] = {}
+    motions: dict[int, tuple[float, float]] = {}
+    times, frame_time = HostTime(), FrameTime(scenario)
+    for record in log.records([name for name in (topics.RIGID_BODIES, names.odom) if name in log.topics]):
+        try:
+            if record.topic == names.odom:
+                sample = read_odometry(record.payload, record.log_ns)
+                motions[sample.stamp_ns] = (sample.v2, sample.u2)
+            else:
+                frame = read_frame(record.payload, names.leader, names.follower)
+                timed = frame_time.of(times, frame, record.log_ns)
+                times = timed.times
+                if not timed.refusal:
+                    poses[timed.capture_ns] = (frame.follower.x, frame.follower.y, frame.follower.theta)
+        except RefusedError:
+            continue
+    return OwnRecord(poses, motions)
+
+
+def own_alignment(record: OwnRecord) -> Alignment:
+    """Delay and scales of the odometry against the poses."""
+    if not (record.poses and record.motions):
+        return UNKNOWN
+    zero_ns = min((*record.poses, *record.motions))
+    seen_ns, told_ns = sorted(record.poses), sorted(record.motions)
+    return align_odometry(
+        np.array([(at_ns - zero_ns) * 1e-9 for at_ns in seen_ns]),
+        np.array([record.poses[at_ns] for at_ns in seen_ns]),
+        np.array([(at_ns - zero_ns) * 1e-9 for at_ns in told_ns]),
+        np.array([record.motions[at_ns] for at_ns in told_ns]),
+    )
+
+
+def judge_own_motion(log: Log, scenario: Scenario) -> dict[str, float]:
+    """The ``own_motion`` part of a summary: delay_s, scale_v and scale_u, each with its standard deviation.
+
+    ``delay_s`` is by how much the robot's motion comes later than odometry says; the true motion is the scale
+    times odometry. What the log does not let know is absent: there may be no mocap, or hardly any motion.
+    """
+    if not {topics.RIGID_BODIES, topics_of(scenario).odom} <= set(log.topics):
+        return {}
+    found = own_alignment(own_record(log, scenario))
+    result: dict[str, float] = {}
+    for name, known in (("delay_s", found.delay), ("scale_v", found.scale_v), ("scale_u", found.scale_u)):
+        if known is not None:
+            result |= {name: known.value, f"{name}_sd": known.sd}
+    return result

@@ -1,0 +1,64 @@
+"""What is left beside the log of a run or a replay: its summary, its picture and its report."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hil.errors import UsageError
+from hil.log.report_json import write_json
+
+if TYPE_CHECKING:
+    from hil.judge.evidence import Evidence
+    from hil.log.reader import Log
+
+
+def made_folder(folder: Path) -> Path:
+    """The folder of --out, made with all above it; raises :class:`UsageError` if it cannot be."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"--out {folder}: cannot be made ({error.strerror}); give another folder") from None
+    return folder
+
+
+@contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """Keep other runs out of a folder; raises :class:`UsageError` if one is going on in it."""
+    held = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise UsageError(f"--out {folder}: another run is going on there; give another folder") from None
+        yield
+    finally:
+        os.close(held)
+
+
+def judge_log(log: Log, folder: Path) -> dict[str, Any]:
+    """Summary of the log of a pair; ``summary.json``, ``run.png`` and ``report.html`` go into the folder."""
+    from hil.judge.evidence import evidence_of_log
+    from hil.judge.summary import summarise
+
+    evidence = evidence_of_log(log)
+    summary = summarise(evidence)
+    leave(evidence, summary, folder, "run.png")
+    return summary
+
+
+def leave(evidence: Evidence, summary: Mapping[str, Any], folder: Path, picture: str) -> None:
+    """Write the summary of an evidence, its picture by the given name, and its report."""
+    # All that drawing needs: a second of imports, for those who ask only.
+    from hil.figures.run_figures import draw_run
+    from hil.figures.shown import Shown
+    from hil.reports.run_report import run_report
+
+    write_json(summary, folder / "summary.json")
+    shown = Shown.of(evidence)
+    draw_run(shown, summary, folder / picture)
+    (folder / "report.html").write_text(run_report(shown, summary), encoding="utf-8")

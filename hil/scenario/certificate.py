@@ -1,0 +1,109 @@
+"""A scenario's certificate: its premises from the scenario, its JSON, and its text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from estimation.bounds.premises import Premises
+from formation.shape import ABREAST_ALPHA2
+from formation.spacing import Spacing
+from formation.speed_range import SpeedRange
+from formation.station import Side
+from hil.scenario.noise_bounds import NOISE_SIGMAS, position_bound
+from hil.scenario.schema import Scenario, TableProgram
+
+if TYPE_CHECKING:
+    from estimation.bounds.certificate import Certificate, Claim
+
+
+def certificate_of(scenario: Scenario, *, driven: bool = True) -> Certificate:
+    """Certificate of a scenario; ``driven``: its program drives the leader, which tells the speeds.
+
+    Of a recorded leader nothing but its limits is known.
+    """
+    from estimation.bounds.certificate import certify  # compiled kernels behind it: only for those who ask
+
+    return certify(premises_of(scenario, driven=driven))
+
+
+def premises_of(scenario: Scenario, *, driven: bool = True) -> Premises:
+    """What the certificate of a scenario starts from."""
+    leader, law = scenario.leader, scenario.controller
+    eps, of_what = _noise(scenario)
+    return Premises(
+        eps=eps,
+        step=1.0 / scenario.mocap.rate_hz,
+        v_eps=leader.v_eps,
+        k_v=leader.k_v,
+        k_u=leader.k_u,
+        speeds=_speeds(scenario) if driven else SpeedRange(leader.v_eps, leader.k_v),
+        mu1=law.mu1,
+        mu2=law.mu2,
+        spacing=Spacing(scenario.formation.rho_0, law.mu_rho),
+        noise=f"positions within {NOISE_SIGMAS:g} sigma = {1e3 * eps:.3g} mm ({of_what})",
+        side=Side(scenario.formation.side),
+        unproved=_unproved(scenario),
+    )
+
+
+def _unproved(scenario: Scenario) -> str:
+    """Why nothing is known of the formation that this scenario's follower keeps; empty if something is."""
+    law, bearing = scenario.controller, scenario.formation.bearing
+    if bearing != ABREAST_ALPHA2:
+        return f"the set is known abreast only, and formation.bearing is {bearing:g} rad"
+    if law.tilt != 0.0:
+        return f"the set is known without tilt only, and controller.tilt is {law.tilt:g} rad"
+    return ""
+
+
+def _noise(scenario: Scenario) -> tuple[float, str]:
+    """Bound of the error of a leader position in the worst direction [m], and what of."""
+    given = scenario.estimator
+    if given.front_end == "world":
+        return position_bound(scenario), "motion capture"
+    rho_0 = scenario.formation.rho_0
+    sigma = max(given.sigma_range, rho_0 * given.sigma_bearing)
+    return NOISE_SIGMAS * sigma, f"range and bearing at {rho_0:g} m"
+
+
+def _speeds(scenario: Scenario) -> SpeedRange:
+    program = scenario.leader.program
+    speeds = program.v if isinstance(program, TableProgram) else [program.v]
+    if min(speeds) <= 0.0:
+        return SpeedRange(scenario.leader.v_eps, scenario.leader.k_v)
+    return SpeedRange(min(speeds), max(speeds))
+
+
+def certificate_json(certificate: Certificate) -> dict[str, Any]:
+    """JSON of ``abreast bounds``: per claim its figures, ``assumes``, and ``why`` where there are none."""
+    return {name: _claim_json(claim) for name, claim in certificate.claims().items()}
+
+
+def _claim_json(claim: Claim) -> dict[str, Any]:
+    told: dict[str, Any] = {**claim.figures, "assumes": list(claim.assumes)}
+    return told if claim.why is None else told | {"why": claim.why}
+
+
+_TITLES = {
+    "rates": ("rates", "M_rho {M_rho:.4f} m/s, M_alpha2 {M_alpha2:.4f} rad/s"),
+    "estimates": ("estimates", "v1 within {M_v1:.4f} m/s"),
+    "h": ("error of h", "{sound:.3f} rad/s (by the paper's form {paper:.3f}, which is not a bound)"),
+    "alpha2_ultimate": ("alpha2", "ends within {value:.4f} rad of where it is steered"),
+    "formation": ("formation", ""),
+    "formation_any_speed": ("  at any speed", ""),
+    "formation_with_errors": ("  with wrong estimates", ""),
+    "k_u_star": ("k_u* of Prop. 3", "between {lower:.3f} and {upper:.3f} rad/s"),
+}
+_SET = "rho {rho_min:.4f} to {rho_max:.4f} m, alpha1 {alpha1_min:.4f} to {alpha1_max:.4f} rad"
+
+
+def certificate_lines(certificate: Certificate) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+    """Per claim a name, what is guaranteed or why nothing is, and what it assumes."""
+    for name, claim in certificate.claims().items():
+        title, text = _TITLES[name]
+        figures = claim.figures
+        finding = (text or _SET).format(**figures) if figures else "nothing is guaranteed"
+        if "M_alpha1" in figures:
+            finding += f", alpha1 within {figures['M_alpha1']:.4f} rad"
+        yield title, finding + (f": {claim.why}" if claim.why else ""), claim.assumes

@@ -1,0 +1,131 @@
+"""The noise-free experiments of the paper: a pair under a law, no wire, no estimator, no speed limits."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from formation.angles import FloatArray
+from formation.closed_loop import IntegrationError, Trajectory
+from formation.periodic_orbit import PeriodicOrbit, find_orbit
+from formation.spacing import lyapunov
+from hil.errors import CheckFailedError, UsageError
+from hil.figures.simulation_figures import draw_experiment, draw_simulation
+from hil.figures.stability_figures import draw_stability
+from hil.judge.stability import PROVED_V1, Stability, stability_json, stability_of
+from hil.scenario import parts as scenario_parts
+from hil.scenario.noise_free_runs import follower_law, noise_free_run
+from hil.scenario.ordered_sides import refusal
+from hil.scenario.schema import Scenario
+
+SAMPLE_STEP = 0.005
+MOST_SAMPLES = 200_000
+
+_COLUMNS = ("t", "rho", "alpha1", "alpha2", "v1", "u1", "v2", "u2")
+_POSE_COLUMNS = ("x", "y", "theta")
+
+
+def simulate(scenario: Scenario, out: Path | None, *, stability: bool = False) -> dict[str, object]:
+    """Run the scenario's law on the exact shape dynamics and report on it; with ``out``, write files there.
+
+    The report is the JSON of ``abreast simulate``: ``final`` shape; ``orbit`` of the reduced system, absent
+    if the leader's program has no period or no orbit was found; ``extremes`` of the follower's motion over
+    the whole run; ``V1_initial`` and whether it lies in the region of attraction that Prop. 1 proves (the
+    true region is larger). ``orbit.floquet`` is the largest modulus of the Floquet multipliers. The motion is
+    not limited, as in the proofs.
+
+    With orders to change sides it is limited, and they are treated as by the controller daemon;
+    ``orders_refused`` says why, if they are refused.
+
+    With ``stability``, ``stability`` too: the propositions checked by :mod:`hil.judge.stability`, and its
+    picture.
+
+    Files: ``trajectory.csv`` and the pictures ``simulation.png`` (laid out like the paper's Fig. 2) and
+    ``experiment.png`` (like its Fig. 3). Raises :class:`CheckFailedError` if the motion breaks down.
+    """
+    try:
+        trajectory = noise_free_run(scenario, _sample_times(scenario.run.duration_s))
+    except IntegrationError as error:
+        raise CheckFailedError(f"scenario {scenario.name}: {error}; check gains and start poses") from error
+    program, law = scenario_parts.leader_program(scenario), follower_law(scenario)
+    changes = scenario.formation.change_sides_at_s
+    orbit = (
+        None
+        if changes
+        else find_orbit(program, law, scenario.formation.rho_0, scenario_parts.station(scenario))
+    )
+    report = _report(scenario, trajectory, orbit)
+    if (why := refusal(scenario)) is not None:
+        report["orders_refused"] = why
+    if out is not None:
+        _write(scenario, trajectory, orbit, out)
+    if stability:
+        found = stability_of(scenario, trajectory)
+        report["stability"] = stability_json(found)
+        if out is not None:
+            _write_stability(scenario, found, out)
+    return report
+
+
+def _sample_times(duration: float) -> FloatArray:
+    step = max(SAMPLE_STEP, duration / MOST_SAMPLES)
+    return np.linspace(0.0, duration, max(2, round(duration / step) + 1))
+
+
+def _report(scenario: Scenario, trajectory: Trajectory, orbit: PeriodicOrbit | None) -> dict[str, object]:
+    start, final = trajectory.shape_at(0), trajectory.shape_at(-1)
+    V1_initial = lyapunov(start, scenario_parts.gains(scenario).spacing, scenario_parts.station(scenario))
+    report: dict[str, object] = {
+        "final": {"rho": final.rho, "alpha1": final.alpha1, "alpha2": final.alpha2},
+    }
+    if orbit is not None:
+        report["orbit"] = {
+            "period_s": orbit.period,
+            **_range("rho", orbit.rho),
+            **_range("alpha1", orbit.alpha1),
+            **_range("v2", orbit.v2),
+            "floquet": orbit.largest_multiplier,
+        }
+    report["extremes"] = {"v2": _extremes(trajectory.v2), "u2": _extremes(trajectory.u2)}
+    report["V1_initial"] = V1_initial
+    report["in_region_of_attraction"] = V1_initial < PROVED_V1
+    return report
+
+
+def _range(name: str, values: FloatArray) -> dict[str, float]:
+    return {f"{name}_min": float(values.min()), f"{name}_max": float(values.max())}
+
+
+def _extremes(values: FloatArray) -> list[float]:
+    return [float(values.min()), float(values.max())]
+
+
+def _write(scenario: Scenario, trajectory: Trajectory, orbit: PeriodicOrbit | None, out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        _write_csv(trajectory, out / "trajectory.csv")
+        draw_simulation(scenario, trajectory, orbit, out / "simulation.png")
+        draw_experiment(scenario, trajectory, out / "experiment.png")
+    except OSError as error:
+        raise UsageError(f"{out}: cannot be written ({error.strerror}); choose another --out") from error
+
+
+def _write_stability(scenario: Scenario, found: Stability, out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        draw_stability(scenario, found, out / "stability.png")
+    except OSError as error:
+        raise UsageError(f"{out}: cannot be written ({error.strerror}); choose another --out") from error
+
+
+def _write_csv(trajectory: Trajectory, path: Path) -> None:
+    """One row per sample: shape, motions of both, poses of both. Floats as Python repeats them exactly."""
+    header = [*_COLUMNS, *(f"leader_{c}" for c in _POSE_COLUMNS), *(f"follower_{c}" for c in _POSE_COLUMNS)]
+    columns = [getattr(trajectory, name) for name in _COLUMNS]
+    table = np.column_stack([*columns, trajectory.leader, trajectory.follower])
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(table.tolist())

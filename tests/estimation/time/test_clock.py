@@ -1,0 +1,164 @@
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from estimation.time.clock import LARGEST_DRIFT, NOTHING_HEARD, Arrival, Clock, heard, jitter_of, lower_line
+
+BEGIN_NS = 1_700_000_000_000_000_000
+MS = 1_000_000
+LATENCY_NS = 30 * MS
+
+
+def arrivals(
+    delays: Sequence[float], rate: float = 120.0, offset: float = 0.0, drift: float = 0.0, first: int = 0
+) -> list[Arrival]:
+    """Frames with the given delays [s] above the latency, in the order of reception."""
+    made = []
+    for k, delay in enumerate(delays, start=first):
+        true_ns = BEGIN_NS + round(k / rate * 1e9)
+        capture_ns = true_ns + round((offset + drift * k / rate) * 1e9)
+        made.append(Arrival(k, capture_ns, true_ns + LATENCY_NS + round(delay * 1e9)))
+    return sorted(made, key=lambda each: each.receive_ns)
+
+
+def folded(heard_of: Sequence[Arrival], clock: Clock = NOTHING_HEARD) -> Clock:
+    for arrival in heard_of:
+        clock = heard(clock, arrival)
+    return clock
+
+
+@pytest.mark.parametrize("kind", ["exponential", "uniform", "gamma"])
+@pytest.mark.parametrize(("rate", "jitter"), [(120.0, 0.001), (120.0, 0.02), (10.0, 0.005)])
+def test_offset_and_drift_are_found_within_the_errors_stated(kind: str, rate: float, jitter: float) -> None:
+    for seed in range(3):
+        generator, count = np.random.default_rng(seed), round(15.0 * rate)
+        drawn = {
+            "exponential": generator.exponential(jitter, count),
+            "uniform": generator.uniform(0.0, 2.0 * jitter, count),
+            "gamma": generator.gamma(2.0, 0.5 * jitter, count),
+        }[kind]
+        clock = folded(arrivals(drawn.tolist(), rate, offset=5.0, drift=5e-5))
+        assert clock.line is not None
+        assert clock.newest is not None
+        assert clock.offset is not None
+        assert clock.drift is not None
+        ahead = 5.0 + 5e-5 * (clock.newest.number / rate) - LATENCY_NS * 1e-9
+        assert clock.offset == pytest.approx(ahead, abs=clock.line.error)
+        assert clock.drift == pytest.approx(5e-5, abs=clock.line.slope_error)
+        assert clock.line.error < 1.5 * jitter
+        assert clock.jumps == 0
+
+
+def test_jitter_is_told_by_its_percentiles() -> None:
+    delays = np.random.default_rng(4).exponential(0.005, 3000).tolist()
+    found = folded(arrivals(delays)).jitter()
+    assert found is not None
+    assert found.p50 == pytest.approx(0.005 * np.log(2.0), rel=0.15)
+    assert found.p99 == pytest.approx(0.005 * np.log(100.0), rel=0.3)
+    assert jitter_of([3.0, 1.0, 2.0]).largest == 3.0
+
+
+def test_little_is_known_at_the_begin_and_a_steady_delay_tells_all() -> None:
+    assert not folded(arrivals([0.0] * 20)).known
+    early = folded(arrivals([0.0] * 120))
+    assert early.known
+    assert early.drift is None
+    late = folded(arrivals([0.0] * 2400, drift=-2e-5))
+    assert late.drift == pytest.approx(-2e-5, abs=1e-7)
+    for nothing in (NOTHING_HEARD.offset, NOTHING_HEARD.drift, NOTHING_HEARD.jitter()):
+        assert nothing is None
+
+
+@pytest.mark.parametrize("jump", [-10.0, -0.3, -0.08, 0.08, 3.0, 3600.0])
+@pytest.mark.parametrize("jitter", [0.0, 0.004])
+def test_a_clock_that_jumps_begins_anew_within_a_third_of_a_second(jump: float, jitter: float) -> None:
+    delays = np.random.default_rng(5).exponential(1.0, 800) * jitter
+    before = folded(arrivals(delays[:600].tolist(), offset=1.0))
+    after = arrivals(delays[600:].tolist(), offset=1.0 + jump, first=600)
+    at_once, later = folded(after[:12], before), folded(after[:40], before)
+    assert (before.jumps, at_once.jumps, later.jumps) == (0, 0, 1)
+    assert later.offset == pytest.approx(1.0 + jump - LATENCY_NS * 1e-9, abs=3e-3)
+    assert folded(after, before).jumps == 1
+
+
+def test_a_clock_that_begins_anew_with_its_numbers_has_jumped() -> None:
+    before = folded(arrivals([0.0] * 2400, offset=100.0))
+    after = [
+        Arrival(each.number - 2400, each.capture_ns - 120_000 * MS, each.receive_ns)
+        for each in arrivals([0.0] * 60, offset=100.0, first=2400)
+    ]
+    assert folded(after, before).jumps == 1
+
+
+def shuffled() -> list[float]:
+    return list(np.random.default_rng(6).uniform(0.0, 0.1, 2400))
+
+
+def stalled() -> list[float]:
+    """Once in two seconds nothing comes for 0.4 s, then all at once."""
+    return [max(0.0, 0.4 - (k % 240) / 120.0) for k in range(2400)]
+
+
+def slower_for_a_while() -> list[float]:
+    return [0.0] * 800 + [0.3] * 800 + [0.0] * 800
+
+
+def slower_and_shaken() -> list[float]:
+    return [0.0] * 800 + list(np.random.default_rng(7).uniform(0.06, 0.2, 1600))
+
+
+@pytest.mark.parametrize("network", [shuffled, stalled, slower_for_a_while, slower_and_shaken])
+def test_a_network_at_its_worst_is_no_jump(network: Callable[[], list[float]]) -> None:
+    clock = folded(arrivals(network(), offset=-2.0, drift=1e-5))
+    assert clock.jumps == 0
+    assert clock.offset == pytest.approx(-2.0 + 1e-5 * 20.0 - 0.03, abs=0.011)
+
+
+def test_single_stamps_gone_wrong_are_no_jump_and_move_nothing() -> None:
+    made = arrivals([0.0] * 1200)
+    wrong = [
+        Arrival(each.number, each.capture_ns + (-1) ** k * 5_000 * MS, each.receive_ns)
+        if k % 40 == 7
+        else each
+        for k, each in enumerate(made)
+    ]
+    clock = folded(wrong)
+    assert clock.jumps == 0
+    assert clock.offset == pytest.approx(-LATENCY_NS * 1e-9, abs=1e-6)
+
+
+@given(
+    st.lists(st.integers(0, 40 * MS), min_size=12, max_size=40),
+    st.integers(0, 10**18),
+    st.floats(-4e-4, 4e-4),
+)
+def test_the_line_is_the_best_one_below_all_points(excess: list[int], zero_ns: int, slope: float) -> None:
+    points = [
+        (zero_ns + k * 1000 * MS, round(slope * k * 1000 * MS) + extra) for k, extra in enumerate(excess)
+    ]
+    found = lower_line(points)
+    t = np.arange(len(points), dtype=np.float64)
+    d = np.array([delay_ns for _, delay_ns in points]) * 1e-6
+    gaps = d - np.array([found.at_ns(capture_ns) for capture_ns, _ in points]) * 1e-6
+    assert gaps.min() > -2e-6
+    # The same as a linear program: the highest mean of a line that is nowhere above a point (in ms).
+    best = linprog(
+        [-1.0, -t.mean()],
+        A_ub=np.column_stack([np.ones_like(t), t]),
+        b_ub=d,
+        bounds=[(None, None), (-1e3 * LARGEST_DRIFT, 1e3 * LARGEST_DRIFT)],
+    )
+    assert d.mean() - gaps.mean() == pytest.approx(-float(best.fun or 0.0), abs=1e-4)
+
+
+def test_lines_and_percentiles_need_something_to_go_by() -> None:
+    with pytest.raises(ValueError, match="no points"):
+        lower_line([])
+    with pytest.raises(ValueError, match="no delays"):
+        jitter_of([])

@@ -1,0 +1,65 @@
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from estimation.time.clock import Arrival
+from estimation.time.host_time import HostTime, on_host
+
+MS = 1_000_000
+LATENCY_NS = 30 * MS
+HOST_NS = 1_700_000_000_000_000_000
+
+
+def frames(seconds: float, jitter: float, jump_at: float = 1e9) -> list[tuple[Arrival, int]]:
+    """Frames of a clock that counts from its own start, with their true capture on the host's clock."""
+    delays, made = np.random.default_rng(3).exponential(1.0, round(seconds * 120)) * jitter, []
+    for k, delay in enumerate(delays.tolist()):
+        at_ns = round(k / 120 * 1e9)
+        stamp_ns = round(at_ns * (1.0 + 5e-5)) + (7_000 * MS if at_ns > jump_at * 1e9 else 0)
+        receive_ns = HOST_NS + at_ns + LATENCY_NS + round(delay * 1e9)
+        made.append((Arrival(k, stamp_ns, receive_ns), HOST_NS + at_ns))
+    return sorted(made, key=lambda item: item[0].receive_ns)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.003])
+def test_captures_are_told_on_the_clock_of_the_host(jitter: float) -> None:
+    times, errors = HostTime(), []
+    for arrival, true_ns in frames(20.0, jitter):
+        times, found_ns = on_host(times, arrival, LATENCY_NS)
+        if found_ns is not None:
+            errors.append((found_ns - true_ns) * 1e-9)
+    assert len(errors) > 2350
+    assert max(map(abs, errors)) < 6e-4
+    assert max(map(abs, errors[1500:])) < 1e-4
+
+
+def test_what_comes_late_or_again_keeps_its_place_in_time() -> None:
+    times = HostTime()
+    mapped: dict[int, int] = {}
+    sent = [each for each, _ in frames(3.0, 0.02)]
+    again = [each for k, each in enumerate(sent) if k % 7 == 0]
+    for arrival in sorted([*sent, *again], key=lambda each: each.receive_ns):
+        times, found_ns = on_host(times, arrival, LATENCY_NS)
+        if found_ns is None:
+            continue
+        assert mapped.get(arrival.capture_ns, found_ns) == pytest.approx(found_ns, abs=1e3)
+        mapped[arrival.capture_ns] = found_ns
+    in_order = [mapped[capture_ns] for capture_ns in sorted(mapped)]
+    assert all(before < after for before, after in pairwise(in_order))
+    newest = max(sent, key=lambda each: each.capture_ns)
+    assert on_host(times, newest, LATENCY_NS)[1] == mapped[newest.capture_ns]
+    assert len(times.knots) < 125
+
+
+def test_a_jump_leaves_a_gap_and_no_step() -> None:
+    times, found = HostTime(), []
+    for arrival, true_ns in frames(4.0, 0.001, jump_at=2.0):
+        times, found_ns = on_host(times, arrival, LATENCY_NS)
+        if found_ns is not None:
+            found.append((true_ns, found_ns))
+    assert times.clock.jumps == 1
+    assert max(abs(found_ns - true_ns) for true_ns, found_ns in found) < 2 * MS
+    assert max(b - a for (a, _), (b, _) in pairwise(found)) < 320 * MS
