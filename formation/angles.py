@@ -20,7 +20,7 @@ def wrapped(angle: float) -> float:
     """Angle [rad] in (-pi, pi] that differs by whole turns, exactly; NaN for NaN and infinities."""
     if not math.isfinite(angle):
         return math.nan
-    turned = angle if abs(angle) < _TURN else math.fmod(angle, _TURN)
+    turned = angle if abs(angle) < _TURN else float(np.fmod(angle, _TURN))
     # Both shifts are exact: the operands are within a factor of two of each other (Sterbenz).
     if turned > math.pi:
         turned = turned - _TURN

@@ -7,15 +7,15 @@ bearing of the leader seen from the follower, and the follower's own motion).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 
-from estimation.models.motion import FollowerMotion, Matrix, Vector
+from estimation.models.coordinated_turn import FollowerMotion, Spread
+from estimation.models.motion import Matrix, Vector
+from formation.kernel import kernel
 from formation.pose import Pose
-
-_UNIT = np.eye(2)
 
 
 class FrontEnd(Enum):
@@ -25,61 +25,97 @@ class FrontEnd(Enum):
     BODY = "body"
 
 
-@dataclass(frozen=True, slots=True)
-class PoseNoise:
+class PoseNoise(NamedTuple):
     """Standard deviations of a mocap pose: position [m] per axis, heading [rad]."""
 
     position: float
     heading: float
 
 
-@dataclass(frozen=True, slots=True)
-class PairSeen:
+class PairSeen(NamedTuple):
     """Both robots as one mocap frame shows them: the leader's position [m], the follower's pose."""
 
-    leader: tuple[float, float]
+    leader_x: float
+    leader_y: float
     follower: Pose
-    noise: PoseNoise
 
 
-@dataclass(frozen=True, slots=True)
-class Measurement:
+NOBODY_SEEN = PairSeen(0.0, 0.0, Pose(0.0, 0.0, 0.0))
+
+
+class Measurement(NamedTuple):
     """The leader's position at one capture time, and what belongs to that moment.
 
-    position: (2,) [m], in the mocap frame or in the follower's body frame.
-    covariance: (2, 2) [m^2] of the position.
+    x, y: [m], in the mocap frame, or along the follower's axes. spread: their covariance [m^2].
     motion: the follower's measured motion at the capture time.
-    pose, pose_noise: the follower's mocap pose; None for the body front end.
-    seen: the mocap frame that all of this comes from, in either front end; None for a sighting.
+    in_world: whether x and y are mocap's; the follower's pose is then that of ``seen``.
+    framed: whether all this comes from a mocap frame, which is ``seen``, or from a sighting.
+    noise: of the pose in ``seen``.
     """
 
     capture_ns: int
-    position: Vector
-    covariance: Matrix
+    x: float
+    y: float
+    spread: Spread
     motion: FollowerMotion
-    pose: Pose | None = None
-    pose_noise: PoseNoise | None = None
-    seen: PairSeen | None = None
+    in_world: bool
+    framed: bool
+    seen: PairSeen
+    noise: PoseNoise
+
+    @property
+    def position(self) -> Vector:
+        """Position (2,) [m]."""
+        return np.array([self.x, self.y])
+
+    @property
+    def covariance(self) -> Matrix:
+        """Covariance (2, 2) [m^2] of the position."""
+        xx, xy, yy = self.spread
+        return np.array([[xx, xy], [xy, yy]])
+
+    @property
+    def pose(self) -> Pose | None:
+        """The follower's mocap pose; None for the body front end."""
+        return self.seen.follower if self.in_world else None
+
+    @property
+    def pose_noise(self) -> PoseNoise | None:
+        """Noise of the pose; None for the body front end."""
+        return self.noise if self.in_world else None
 
 
+@kernel
 def measure_world(
-    capture_ns: int, leader: tuple[float, float], follower: Pose, noise: PoseNoise, motion: FollowerMotion
+    capture_ns: int, seen: PairSeen, noise: PoseNoise, motion: FollowerMotion
 ) -> Measurement:
     """World front end: the leader's mocap position, with covariance sigma_p^2 I."""
-    covariance = noise.position**2 * _UNIT
-    seen = PairSeen(leader, follower, noise)
-    return Measurement(capture_ns, np.array(leader), covariance, motion, follower, noise, seen)
+    variance = noise.position * noise.position
+    spread = Spread(variance, 0.0, variance)
+    return Measurement(capture_ns, seen.leader_x, seen.leader_y, spread, motion, True, True, seen, noise)
 
 
-def from_sensor(rho: float, alpha2: float, place: tuple[float, float]) -> tuple[float, float]:
+@kernel
+def from_sensor(rho: float, alpha2: float, sensor_x: float, sensor_y: float) -> tuple[float, float]:
     """Range [m] and bearing [rad] from the follower's wheel axis, out of those from a sensor's place.
 
-    place: [m] ahead of the axis' middle and to the left of it; the sensor's axes are the follower's.
+    sensor_x, sensor_y: [m] ahead of the axis' middle and to the left of it; the axes are the follower's.
     """
-    x, y = place[0] + rho * math.cos(alpha2), place[1] + rho * math.sin(alpha2)
-    return math.hypot(x, y), math.atan2(y, x)
+    x, y = sensor_x + rho * math.cos(alpha2), sensor_y + rho * math.sin(alpha2)
+    return math.sqrt(x * x + y * y), math.atan2(y, x)
 
 
+@kernel
+def spread_of_sight(cos: float, sin: float, along: float, across: float) -> Spread:
+    """Covariance of a position whose variances are given along a line of sight and across it."""
+    return Spread(
+        cos * cos * along + sin * sin * across,
+        cos * sin * (along - across),
+        sin * sin * along + cos * cos * across,
+    )
+
+
+@kernel
 def measure_body(
     capture_ns: int, rho: float, alpha2: float, sd_rho: float, sd_alpha2: float, motion: FollowerMotion
 ) -> Measurement:
@@ -87,22 +123,27 @@ def measure_body(
 
     The covariance is diag(sd_rho^2, (rho sd_alpha2)^2) along and across the line of sight.
     """
-    cos_a, sin_a = math.cos(alpha2), math.sin(alpha2)
-    rotation = np.array([[cos_a, -sin_a], [sin_a, cos_a]])
-    spread = rotation * np.array([sd_rho, rho * sd_alpha2])
-    return Measurement(capture_ns, rho * rotation[:, 0], spread @ spread.T, motion)
+    cos, sin, sd_across = math.cos(alpha2), math.sin(alpha2), rho * sd_alpha2
+    spread = spread_of_sight(cos, sin, sd_rho * sd_rho, sd_across * sd_across)
+    noise, seen = PoseNoise(0.0, 0.0), PairSeen(0.0, 0.0, Pose(0.0, 0.0, 0.0))
+    return Measurement(capture_ns, rho * cos, rho * sin, spread, motion, False, False, seen, noise)
 
 
+@kernel
 def measure_body_from_mocap(
-    capture_ns: int, leader: tuple[float, float], follower: Pose, noise: PoseNoise, motion: FollowerMotion
+    capture_ns: int, seen: PairSeen, noise: PoseNoise, motion: FollowerMotion
 ) -> Measurement:
     """Body front end fed by mocap.
 
     var(rho) = 2 sigma_p^2, var(alpha2) = 2 sigma_p^2 / rho^2 + sigma_heading^2.
     """
-    dx, dy = leader[0] - follower.x, leader[1] - follower.y
-    rho, alpha2 = math.hypot(dx, dy), math.atan2(dy, dx) - follower.theta
-    sd_rho = math.sqrt(2.0) * noise.position
-    sd_alpha2 = math.hypot(sd_rho / rho, noise.heading)
-    measured = measure_body(capture_ns, rho, alpha2, sd_rho, sd_alpha2, motion)
-    return replace(measured, seen=PairSeen(leader, follower, noise))
+    follower = seen.follower
+    dx, dy = seen.leader_x - follower.x, seen.leader_y - follower.y
+    cos, sin = math.cos(follower.theta), math.sin(follower.theta)
+    x, y = cos * dx + sin * dy, cos * dy - sin * dx
+    squared = x * x + y * y
+    rho = math.sqrt(squared)
+    along = 2.0 * noise.position * noise.position
+    across = along + squared * noise.heading * noise.heading
+    spread = spread_of_sight(x / rho, y / rho, along, across)
+    return Measurement(capture_ns, x, y, spread, motion, False, True, seen, noise)

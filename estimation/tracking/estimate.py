@@ -3,29 +3,54 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from estimation.filters.belief import Belief
+from estimation.filters.ekf import spread_by, turned
+from estimation.models.coordinated_turn import FollowerMotion, Push
 from estimation.models.measurement import Measurement
-from estimation.models.motion import Matrix, Vector
-from estimation.tracking.screening import NO_DOUBT, Doubt
-from estimation.tracking.tracker import Status, TrackPoint
-from formation.angles import wrap
+from estimation.models.motion import Matrix
+from estimation.tracking.track_point import JumpUncertainty, TrackPoint
+from estimation.tracking.tracker import Status
+from formation.angles import wrapped
+from formation.kernel import kernel
+from formation.pose import Pose
 
 QUANTITIES = ("rho_dot", "alpha2_dot", "v1", "alpha1", "u1")
+_LEAST = 1e-9  # of a distance [m] or speed [m/s] that is divided by
+_ROWS, _COLUMNS = np.triu_indices(len(QUANTITIES))
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
+class Joint(NamedTuple):
+    """Upper triangle, by rows, of the covariance of rho_dot (r), alpha2_dot (a), v1 (v), alpha1 (b), u1 (u)."""
+
+    r_r: float
+    r_a: float
+    r_v: float
+    r_b: float
+    r_u: float
+    a_a: float
+    a_v: float
+    a_b: float
+    a_u: float
+    v_v: float
+    v_b: float
+    v_u: float
+    b_b: float
+    b_u: float
+    u_u: float
+
+
+class Estimate(NamedTuple):
     """What the follower believes at ``capture_ns``, seen from its own body.
 
     rho [m], alpha2 [rad]; rho_dot [m/s], alpha2_dot [rad/s]; the leader's v1 [m/s], alpha1 [rad] and
     u1 [rad/s]; the follower's v2 [m/s], u2 [rad/s] it rests on.
-    covariance: (5, 5) of :data:`QUANTITIES`. nis: of the newest measurement, nan for a first one.
-    measured_ns: capture time of the newest measurement that was used.
-    doubt: jumps that may be errors of the mocap; they are in the covariance.
+    joint: covariance of :data:`QUANTITIES`. nis: of the newest measurement, nan for a first one.
+    measured_ns: capture time of the newest measurement that was used. code: the :class:`Status` as a number.
+    jump: jumps that may be errors of the mocap; they are in the covariance.
     """
 
     capture_ns: int
@@ -39,123 +64,182 @@ class Estimate:
     u1: float
     v2: float
     u2: float
-    covariance: Matrix
+    joint: Joint
     nis: float
-    status: Status
-    doubt: Doubt = NO_DOUBT
+    code: int
+    jump: JumpUncertainty
+
+    @property
+    def status(self) -> Status:
+        """How far it can be trusted."""
+        return Status(self.code)
+
+    @property
+    def covariance(self) -> Matrix:
+        """Covariance (5, 5) of :data:`QUANTITIES`."""
+        matrix = np.empty((len(QUANTITIES), len(QUANTITIES)))
+        matrix[_ROWS, _COLUMNS] = matrix[_COLUMNS, _ROWS] = self.joint
+        return matrix
 
 
-def estimate_at(point: TrackPoint, status: Status) -> Estimate:
-    """Estimate at a point of a track.
+def joint_of(covariance: Matrix) -> Joint:
+    """Record of a covariance (5, 5) of :data:`QUANTITIES`."""
+    return Joint(*covariance[_ROWS, _COLUMNS].tolist())
+
+
+class Slope(NamedTuple):
+    """Derivative of a quantity by the leader's position and velocity along the follower's axes."""
+
+    x: float
+    y: float
+    vx: float
+    vy: float
+
+
+class Sight(NamedTuple):
+    """How the leader is seen: unit vector to it, distance, and relative velocity along and across that."""
+
+    ex: float
+    ey: float
+    rho: float
+    along: float
+    across: float
+
+
+@kernel
+def estimate_at(point: TrackPoint, code: int) -> Estimate:
+    """Estimate at a point of a track, its status being given.
 
     A follower's pose that was not believed gives way to the one that its own motion led to.
     """
     measurement = point.measurement
-    if measurement.pose is not None and point.watch is not None:
-        measurement = replace(measurement, pose=point.watch.pose)
-    return estimate_of(point.belief, measurement, status, point.nis, point.used_ns, point.doubt)
+    pose = point.check.pose if point.check.known else measurement.seen.follower
+    return estimate_of(point.belief, measurement, pose, point.jump)._replace(
+        measured_ns=point.used_ns, nis=point.nis, code=code
+    )
 
 
-def estimate_of(
-    belief: Belief,
-    measurement: Measurement,
-    status: Status,
-    nis: float,
-    measured_ns: int,
-    doubt: Doubt = NO_DOUBT,
-) -> Estimate:
-    """Estimate at a measurement's capture time from the belief at that time.
+@kernel
+def estimate_of(belief: Belief, measurement: Measurement, pose: Pose, jump: JumpUncertainty) -> Estimate:
+    """Estimate at a measurement's capture time from the belief at that time, the follower being at a pose.
 
     With e the unit vector to the leader, n its left normal, x the follower's heading and w the leader's
     velocity: rho_dot = e (w - v2 x), alpha2_dot = n (w - v2 x) / rho - u2, v1 = |w|, alpha1 the angle from
     w to -e. Inserted into Eq. (7) these give v1 and alpha1 again, whatever v2 and u2 are.
     """
-    mean, covariance = _in_body_frame(belief, measurement)
-    if doubt is not NO_DOUBT:
-        covariance = _doubted(mean, covariance, doubt)
-    px, py, wx, wy, u1 = mean.tolist()
-    v2, u2 = measurement.motion.v2, measurement.motion.u2
-    rho = math.hypot(px, py)
-    ex, ey = (px / rho, py / rho) if rho > 0.0 else (1.0, 0.0)
-    safe = max(rho, 1e-9)
-    along, across = ex * (wx - v2) + ey * wy, ex * wy - ey * (wx - v2)
-    v1 = math.hypot(wx, wy)
-    jacobian, inputs = _jacobians((ex, ey), (wx, wy), safe, along, across)
-    spread = np.array([measurement.motion.sd_v2, measurement.motion.sd_u2]) * inputs
-    full = jacobian @ covariance @ jacobian.T + spread @ spread.T
+    b, own = along_own_axes(belief, measurement, pose, jump), measurement.motion
+    rho, v1 = math.sqrt(b.x * b.x + b.y * b.y), math.sqrt(b.vx * b.vx + b.vy * b.vy)
+    ex, ey = 1.0, 0.0
+    if rho > 0.0:
+        ex, ey = b.x / rho, b.y / rho
+    safe = max(rho, _LEAST)
+    ahead = b.vx - own.v2
+    sight = Sight(ex, ey, safe, ex * ahead + ey * b.vy, ex * b.vy - ey * ahead)
     return Estimate(
-        capture_ns=measurement.capture_ns,
-        measured_ns=measured_ns,
-        rho=rho,
-        alpha2=math.atan2(py, px),
-        rho_dot=along,
-        alpha2_dot=across / safe - u2,
-        v1=v1,
-        alpha1=float(wrap(math.atan2(-ey, -ex) - math.atan2(wy, wx))),
-        u1=u1,
-        v2=v2,
-        u2=u2,
-        covariance=0.5 * (full + full.T),
-        nis=nis,
-        status=status,
-        doubt=doubt,
+        measurement.capture_ns,
+        measurement.capture_ns,
+        rho,
+        math.atan2(b.y, b.x),
+        sight.along,
+        sight.across / safe - own.u2,
+        v1,
+        wrapped(math.atan2(-ey, -ex) - math.atan2(b.vy, b.vx)),
+        b.u,
+        own.v2,
+        own.u2,
+        joint_covariance(b, sight, own),
+        math.nan,
+        0,
+        jump,
     )
 
 
-def _doubted(mean: Vector, covariance: Matrix, doubt: Doubt) -> Matrix:
-    """Covariance with a doubt about the leader's place, in every direction, and about the own heading."""
-    px, py, wx, wy, _ = mean.tolist()
-    by_heading = np.array([py, -px, wy, -wx, 0.0]) * doubt.heading
-    place = np.array([doubt.position**2, doubt.position**2, 0.0, 0.0, 0.0])
-    return covariance + by_heading[:, None] * by_heading + np.diag(place)
+@kernel
+def along_own_axes(belief: Belief, measurement: Measurement, pose: Pose, jump: JumpUncertainty) -> Belief:
+    """Belief along the follower's axes; a mocap pose brings its own noise into it, a jump what it may be.
+
+    Noise and jump act alike: on the leader's place in every direction, and by the own heading on everything.
+    """
+    b = belief
+    if measurement.in_world:
+        c, s, noise = math.cos(pose.theta), math.sin(pose.theta), measurement.noise
+        b = turned(b._replace(x=b.x - pose.x, y=b.y - pose.y), c, s)
+        b = _blurred(b, noise.position * noise.position, noise.heading * noise.heading)
+    return _blurred(b, jump.position * jump.position, jump.heading * jump.heading)
 
 
-def _in_body_frame(belief: Belief, measurement: Measurement) -> tuple[Vector, Matrix]:
-    """Mean and covariance along the follower's axes; a mocap pose brings its own noise into both."""
-    pose, noise = measurement.pose, measurement.pose_noise
-    if pose is None or noise is None:
-        return belief.mean, belief.covariance
-    c, s = math.cos(pose.theta), math.sin(pose.theta)
-    rotation = np.array(
-        [
-            [c, s, 0.0, 0.0, 0.0],
-            [-s, c, 0.0, 0.0, 0.0],
-            [0.0, 0.0, c, s, 0.0],
-            [0.0, 0.0, -s, c, 0.0],
-            [0.0, 0.0, 0.0, 0.0, 1.0],
-        ]
-    )
-    x, y, wx, wy, u1 = belief.mean.tolist()
-    dx, dy = x - pose.x, y - pose.y
-    mean = np.array([c * dx + s * dy, c * dy - s * dx, c * wx + s * wy, c * wy - s * wx, u1])
-    by_heading = np.array([mean[1], -mean[0], mean[3], -mean[2], 0.0]) * noise.heading
-    covariance = rotation @ belief.covariance @ rotation.T + by_heading[:, None] * by_heading
-    covariance[0, 0] += noise.position**2
-    covariance[1, 1] += noise.position**2
-    return mean, covariance
+@kernel
+def _blurred(b: Belief, place: float, heading: float) -> Belief:
+    """Belief with variances of the follower's place [m^2] and heading [rad^2] in it."""
+    b = spread_by(b, heading, Push(b.y, -b.x, b.vy, -b.vx))
+    return b._replace(x_x=b.x_x + place, y_y=b.y_y + place)
 
 
-def _jacobians(
-    e: tuple[float, float], w: tuple[float, float], rho: float, along: float, across: float
-) -> tuple[Matrix, Matrix]:
-    """Differentiate :data:`QUANTITIES` by the body-frame state (5, 5) and by (v2, u2) (5, 2)."""
-    (ex, ey), (wx, wy) = e, w
+@kernel
+def _slopes(b: Belief, sight: Sight) -> tuple[Slope, Slope, Slope, Slope]:
+    """Derivatives of rho_dot, alpha2_dot, v1 and alpha1."""
+    ex, ey, rho = sight.ex, sight.ey, sight.rho
     nx, ny = -ey, ex
-    speed = max(math.hypot(wx, wy), 1e-9)
-    jacobian = np.array(
-        [
-            [nx * across / rho, ny * across / rho, ex, ey, 0.0],
-            [
-                -(nx * along + ex * across) / rho**2,
-                -(ny * along + ey * across) / rho**2,
-                nx / rho,
-                ny / rho,
-                0.0,
-            ],
-            [0.0, 0.0, wx / speed, wy / speed, 0.0],
-            [nx / rho, ny / rho, wy / speed**2, -wx / speed**2, 0.0],
-            [0.0, 0.0, 0.0, 0.0, 1.0],
-        ]
+    speed = max(math.sqrt(b.vx * b.vx + b.vy * b.vy), _LEAST)
+    turning, closing = sight.across / rho, 1.0 / (rho * rho)
+    squared = speed * speed
+    return (
+        Slope(nx * turning, ny * turning, ex, ey),
+        Slope(
+            -(nx * sight.along + ex * sight.across) * closing,
+            -(ny * sight.along + ey * sight.across) * closing,
+            nx / rho,
+            ny / rho,
+        ),
+        Slope(0.0, 0.0, b.vx / speed, b.vy / speed),
+        Slope(nx / rho, ny / rho, b.vy / squared, -b.vx / squared),
     )
-    inputs = np.array([[-ex, 0.0], [-nx / rho, -1.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
-    return jacobian, inputs
+
+
+@kernel
+def _by(b: Belief, g: Slope) -> Slope:
+    """Covariance of a quantity of this slope with position and velocity."""
+    return Slope(
+        g.x * b.x_x + g.y * b.x_y + g.vx * b.x_vx + g.vy * b.x_vy,
+        g.x * b.x_y + g.y * b.y_y + g.vx * b.y_vx + g.vy * b.y_vy,
+        g.x * b.x_vx + g.y * b.y_vx + g.vx * b.vx_vx + g.vy * b.vx_vy,
+        g.x * b.x_vy + g.y * b.y_vy + g.vx * b.vx_vy + g.vy * b.vy_vy,
+    )
+
+
+@kernel
+def _with_turn(b: Belief, g: Slope) -> float:
+    """Covariance of a quantity of this slope with the leader's turn rate."""
+    return g.x * b.x_u + g.y * b.y_u + g.vx * b.vx_u + g.vy * b.vy_u
+
+
+@kernel
+def _dot(a: Slope, b: Slope) -> float:
+    return a.x * b.x + a.y * b.y + a.vx * b.vx + a.vy * b.vy
+
+
+@kernel
+def joint_covariance(b: Belief, sight: Sight, own: FollowerMotion) -> Joint:
+    """Covariance of :data:`QUANTITIES` of a belief along the follower's axes, the errors of v2, u2 in it."""
+    r, a, v, w = _slopes(b, sight)
+    by_r, by_a, by_v, by_w = _by(b, r), _by(b, a), _by(b, v), _by(b, w)
+    speed, turn = own.sd_v2 * own.sd_v2, own.sd_u2 * own.sd_u2
+    # What v2 and u2 do to the two rates: (-e x, 0) and (-n x / rho, -1).
+    closing, turning = -sight.ex, sight.ey / sight.rho
+    return Joint(
+        _dot(by_r, r) + speed * closing * closing,
+        _dot(by_r, a) + speed * closing * turning,
+        _dot(by_r, v),
+        _dot(by_r, w),
+        _with_turn(b, r),
+        _dot(by_a, a) + speed * turning * turning + turn,
+        _dot(by_a, v),
+        _dot(by_a, w),
+        _with_turn(b, a),
+        _dot(by_v, v),
+        _dot(by_v, w),
+        _with_turn(b, v),
+        _dot(by_w, w),
+        _with_turn(b, w),
+        b.u_u,
+    )

@@ -7,27 +7,41 @@ would have given.
 
 from __future__ import annotations
 
-import bisect
 import math
-from dataclasses import dataclass, replace
-from enum import Enum, IntEnum
+from enum import IntEnum
+from typing import NamedTuple
 
-from estimation.filters.belief import Belief
-from estimation.filters.estimator import Estimator
+from estimation.filters.belief import Belief, sd_heading_of, speed_of
+from estimation.filters.filter import Filter
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, mean_motion
 from estimation.models.measurement import Measurement
-from estimation.own_motion.inputs import mean_motion
-from estimation.tracking.candidate import Candidate, jump, nursed, turned
-from estimation.tracking.screening import (
-    NO_DOUBT,
-    STANDING,
-    Cause,
-    Doubt,
-    Watch,
+from estimation.tracking.follower_check import (
+    BELIEVED,
+    FLIPPED,
+    FROZEN,
+    SWAPPED,
+    Checked,
+    FollowerCheck,
     carried,
-    cause_of,
-    looked_at,
-    watch_from,
+    check_from,
+    checked,
 )
+from estimation.tracking.follower_check import GATED as LEADER_OFF
+from estimation.tracking.reacquisition import joined, jumped, line_turn
+from estimation.tracking.track_point import (
+    DUPLICATE,
+    GATED,
+    LATE,
+    RESTARTED,
+    USED,
+    JumpUncertainty,
+    TrackPoint,
+    begun,
+    no_tentative,
+)
+from formation.kernel import kernel
+from formation.records import Rows, load, size, store
+from formation.ring import Ring, place
 
 _NS = 1e-9
 
@@ -47,23 +61,19 @@ class Status(IntEnum):
     LOST = 4
 
 
-class Verdict(Enum):
-    """What became of a measurement."""
-
-    USED = "used"
-    GATED = "gated"
-    RESTARTED = "restarted"
-    LATE = "too_late"
-    DUPLICATE = "duplicate"
+INITIALISING = Status.INITIALISING.value
+TRACKING = Status.TRACKING.value
+COASTING = Status.COASTING.value
+REJECTING = Status.REJECTING.value
+LOST = Status.LOST.value
 
 
-@dataclass(frozen=True, slots=True)
-class TrackSettings:
+class TrackSettings(NamedTuple):
     """When to believe a measurement and when to believe the estimate.
 
     gate_probability: share of good measurements that pass a chi-square gate.
     reacquire_frames: rejected measurements that must agree with each other before they take over.
-    coast_after, lost_after, window: [s]. doubt_for: how long [s] a jump stays in doubt.
+    coast_after, lost_after, window: [s]. doubt_for: how long [s] a jump stays uncertain.
     settled_heading, unsettled_heading: standard deviation of the leader's direction [rad] below which a track
     settles, and above which it no longer counts as settled.
     capped_speed: whether a leader that seems faster than k_v settles as one of k_v would.
@@ -82,218 +92,278 @@ class TrackSettings:
     followed_turn: float = 0.25
 
 
-@dataclass(frozen=True, slots=True)
-class TrackPoint:
-    """The track right after one measurement.
+class Added(NamedTuple):
+    """Ring with a measurement in it, and what became of this: verdict and cause."""
 
-    ``used_ns``: capture time of the newest one that was used. ``watch``: what the screen of the follower's
-    pose knows, None while no mocap frame has come. ``cause``: why the measurement was not used, if so.
-    ``doubt``: jumps that were followed of late.
+    ring: Ring
+    verdict: int
+    cause: int
+
+
+@kernel
+def gate_of(settings: TrackSettings) -> float:
+    """Chi-square quantile of the gate; with two degrees of freedom it has this closed form."""
+    return -2.0 * math.log1p(-settings.gate_probability)
+
+
+@kernel
+def is_settled(belief: Belief, before: bool, settings: TrackSettings, limits: LeaderLimits) -> bool:
+    """Whether the leader's direction is known well enough, for a track that was settled before or not.
+
+    The first few measurements may make a leader seem faster than any is, and its direction the better known
+    by as much. What is above k_v therefore doesn't help to settle, unless the settings let it.
     """
-
-    measurement: Measurement
-    belief: Belief
-    verdict: Verdict
-    nis: float
-    used_ns: int
-    settled: bool
-    candidate: Candidate | None = None
-    watch: Watch | None = None
-    cause: Cause | None = None
-    doubt: Doubt = NO_DOUBT
+    speed = speed_of(belief)
+    if speed < 0.5 * limits.v_eps:
+        return False
+    sd_heading = sd_heading_of(belief)
+    if before:
+        return sd_heading < settings.unsettled_heading
+    excess = max(1.0, speed / limits.k_v) if settings.capped_speed else 1.0
+    return sd_heading * excess < settings.settled_heading
 
 
-Track = tuple[TrackPoint, ...]
+@kernel
+def status_of(point: TrackPoint, now_ns: int, settings: TrackSettings) -> int:
+    """Status of a track's newest point for one who looks at it at ``now_ns``."""
+    silence = (now_ns - point.used_ns) * _NS
+    if silence > settings.lost_after:
+        return LOST
+    if point.verdict == GATED:
+        return REJECTING
+    if silence > settings.coast_after:
+        return COASTING
+    return TRACKING if point.settled else INITIALISING
 
 
-class Tracker:
-    """Folds measurements into tracks with one estimator. Holds no state of its own between calls."""
+@kernel
+def follow(last: TrackPoint, measurement: Measurement, settings: TrackSettings, filter: Filter) -> TrackPoint:
+    """Fold one measurement, newer than the point, into it.
 
-    def __init__(self, estimator: Estimator, settings: TrackSettings) -> None:
-        self.estimator = estimator
-        self.settings = settings
-        # With two degrees of freedom the chi-square quantile has this closed form.
-        self._gate = -2.0 * math.log1p(-settings.gate_probability)
+    It is used if the leader passes the gate and the frame its checks. If not, it joins the tentative track,
+    which takes over when enough measurements agree and the jump is small against the distance: more than
+    that no robot does, and it has time until the track is lost.
+    """
+    capture_ns, full_gate = measurement.capture_ns, gate_of(settings)
+    found = _checked(last, measurement, full_gate, filter)
+    if (capture_ns - last.used_ns) * _NS > settings.lost_after:
+        return _found(last, measurement, found, settings, filter)
+    # Nothing passes a negative gate: the belief is then the prediction.
+    gate = full_gate if found.cause == BELIEVED else -1.0
+    dt = (capture_ns - last.measurement.capture_ns) * _NS
+    motion = mean_motion(last.measurement.motion, measurement.motion)
+    stepped = filter.step(last.belief, dt, motion, measurement, gate)
+    point = TrackPoint(
+        measurement,
+        stepped.belief,
+        USED,
+        stepped.nis,
+        capture_ns,
+        is_settled(stepped.belief, last.settled, settings, filter.limits),
+        no_tentative(stepped.belief),
+        found.check,
+        BELIEVED,
+        _lasting(last.jump, capture_ns, settings),
+    )
+    if stepped.nis <= gate:
+        return point
+    cause = LEADER_OFF if found.cause == BELIEVED else found.cause
+    rejected = point._replace(verdict=GATED, used_ns=last.used_ns, cause=cause)
+    if cause == FROZEN:
+        return rejected
+    tentative = joined(last.tentative, measurement, filter, full_gate)
+    return _taken_over(rejected._replace(tentative=tentative), settings, filter)
 
-    def add(self, track: Track, measurement: Measurement) -> tuple[Track, Verdict]:
-        """Fold a measurement in at its place in time; return the new track and what became of it.
 
-        A measurement of a capture time that the track has is a DUPLICATE, one from before the window or
-        before the track began is LATE: both leave the track as it is. The verdict of one folded in late is
-        that at its own place.
-        """
-        if not track:
-            return (self.begin(measurement),), Verdict.RESTARTED
-        if measurement.capture_ns > track[-1].measurement.capture_ns:
-            point = self.follow(track[-1], measurement)
-            return self._trim((*track, point)), point.verdict
-        times = [point.measurement.capture_ns for point in track]
-        place = bisect.bisect_left(times, measurement.capture_ns)
-        if times[place] == measurement.capture_ns:
-            return track, Verdict.DUPLICATE
-        if place == 0 or measurement.capture_ns < self._window_begin_ns(track):
-            return track, Verdict.LATE
-        points = list(track[:place])
-        for due in (measurement, *(point.measurement for point in track[place:])):
-            points.append(self.follow(points[-1], due))
-        return tuple(points), points[place].verdict
+@kernel
+def _checked(last: TrackPoint, measurement: Measurement, gate: float, filter: Filter) -> Checked:
+    """Check at the measurement, and what there is against its frame; nothing against a sighting."""
+    check: FollowerCheck = last.check
+    if check.known:
+        dt = (measurement.capture_ns - last.measurement.capture_ns) * _NS
+        check = carried(check, last.measurement.motion, measurement.motion, dt)
+    if not measurement.framed:
+        return Checked(check, BELIEVED)
+    if not check.known:
+        return Checked(check_from(measurement), BELIEVED)
+    leader_moves = speed_of(last.belief) >= 0.5 * filter.limits.v_eps
+    return checked(check, measurement.seen, measurement.noise, gate, leader_moves)
 
-    def begin(self, measurement: Measurement) -> TrackPoint:
-        """First point of a track that knows nothing but this measurement."""
-        return TrackPoint(
-            measurement,
-            self.estimator.start(measurement),
-            Verdict.RESTARTED,
-            math.nan,
-            measurement.capture_ns,
+
+@kernel(inline=False)
+def _found(
+    last: TrackPoint, measurement: Measurement, found: Checked, settings: TrackSettings, filter: Filter
+) -> TrackPoint:
+    """Start anew after a loss: with the tentative track if it is ripe, unless the frame is plainly wrong.
+
+    Flipped headings, swapped bodies and frozen ones no real motion has. What was lost is not moved on, so
+    that a body that stays frozen leads nowhere.
+    """
+    if found.cause == FLIPPED or found.cause == SWAPPED or found.cause == FROZEN:
+        return last._replace(
+            measurement=measurement,
+            verdict=GATED,
+            nis=math.nan,
             settled=False,
-            watch=None if measurement.seen is None else watch_from(measurement.seen),
+            tentative=no_tentative(last.belief),
+            check=found.check,
+            cause=found.cause,
         )
-
-    def follow(self, last: TrackPoint, measurement: Measurement) -> TrackPoint:
-        """Fold one measurement, newer than the point, into it.
-
-        It is used if the leader passes the gate and the frame the screen. If not, it joins the candidate,
-        which takes over when enough measurements agree and the jump is small against the distance: more than
-        that no robot does, and it has time until the track is lost.
-        """
-        if (measurement.capture_ns - last.used_ns) * _NS > self.settings.lost_after:
-            return self._found(last, measurement)
-        dt = (measurement.capture_ns - last.measurement.capture_ns) * _NS
-        watch, cause = self._screened(last, measurement, dt)
-        # Nothing passes a negative gate: the belief is then the prediction.
-        gate = self._gate if cause is None else -1.0
-        motion = mean_motion(last.measurement.motion, measurement.motion)
-        belief, nis = self.estimator.step(last.belief, dt, motion, measurement, gate)
-        settled = self.settled(belief, last.settled)
-        doubt = self._lasting(last.doubt, measurement.capture_ns)
-        if nis <= gate:
-            return TrackPoint(
-                measurement,
-                belief,
-                Verdict.USED,
-                nis,
-                measurement.capture_ns,
-                settled,
-                watch=watch,
-                doubt=doubt,
-            )
-        rejected = TrackPoint(
-            measurement,
-            belief,
-            Verdict.GATED,
-            nis,
-            last.used_ns,
-            settled,
-            None
-            if cause is Cause.FROZEN
-            else nursed(last.candidate, measurement, self.estimator, self._gate),
-            watch,
-            cause or Cause.GATED,
-            doubt,
-        )
-        return self._taken_over(rejected) or rejected
-
-    def status(self, track: Track, now_ns: int) -> Status:
-        """Status of the track's newest point for one who looks at it at ``now_ns``."""
-        if not track:
-            return Status.INITIALISING
-        newest = track[-1]
-        silence = (now_ns - newest.used_ns) * _NS
-        if silence > self.settings.lost_after:
-            return Status.LOST
-        if newest.verdict is Verdict.GATED:
-            return Status.REJECTING
-        if silence > self.settings.coast_after:
-            return Status.COASTING
-        return Status.TRACKING if newest.settled else Status.INITIALISING
-
-    def _found(self, last: TrackPoint, measurement: Measurement) -> TrackPoint:
-        """Start anew after a loss: with the candidate if it is ripe, unless the frame is plainly wrong.
-
-        What was lost is not moved on, so that a body that stays frozen leads nowhere.
-        """
-        dt = (measurement.capture_ns - last.measurement.capture_ns) * _NS
-        watch, cause = self._screened(last, measurement, dt)
-        if cause in STANDING:
-            return replace(
-                last, measurement=measurement, verdict=Verdict.GATED, nis=math.nan, settled=False,
-                candidate=None, watch=watch, cause=cause,
-            )  # fmt: skip
-        begun = self.begin(measurement)
-        candidate = nursed(last.candidate, measurement, self.estimator, self._gate)
-        if candidate.frames < self.settings.reacquire_frames:
-            return begun
-        return replace(begun, belief=candidate.belief, settled=self.settled(candidate.belief, before=False))
-
-    def _screened(
-        self, last: TrackPoint, measurement: Measurement, dt: float
-    ) -> tuple[Watch | None, Cause | None]:
-        """Watch at the measurement, and what there is against its frame; a sighting has none."""
-        seen, watch = measurement.seen, last.watch
-        if watch is not None:
-            watch = carried(watch, last.measurement.motion, measurement.motion, dt)
-        if seen is None:
-            return watch, None
-        if watch is None:
-            return watch_from(seen), None
-        leader_moves = last.belief.speed >= 0.5 * self.estimator.model.limits.v_eps
-        watch, off = looked_at(watch, seen, self._gate, leader_moves=leader_moves)
-        return watch, cause_of(watch, off, self._gate)
-
-    def _taken_over(self, rejected: TrackPoint) -> TrackPoint | None:
-        """Point of a candidate that takes over, in doubt by its jump; None if it is not ripe or goes too far.
-
-        Too far is what would turn the line between the robots, and with it alpha1 and alpha2, by more than
-        ``followed_turn``.
-        """
-        candidate, measurement = rejected.candidate, rejected.measurement
-        if candidate is None or candidate.frames < self.settings.reacquire_frames:
-            return None
-        prior, leader_fits = rejected.belief, rejected.nis <= self._gate
-        doubt = jump(rejected.doubt, measurement, prior, rejected.watch, leader_fits=leader_fits)
-        if turned(doubt, measurement) > self.settings.followed_turn:
-            return None
-        belief = self.estimator.update(prior, measurement) if leader_fits else candidate.belief
-        return TrackPoint(
-            measurement,
-            belief,
-            Verdict.RESTARTED,
-            rejected.nis,
-            measurement.capture_ns,
-            self.settled(belief, before=leader_fits and rejected.settled),
-            watch=candidate.watch or rejected.watch,
-            doubt=doubt,
-        )
-
-    def _lasting(self, doubt: Doubt, now_ns: int) -> Doubt:
-        """Doubt as it is now: a body that has stayed where it jumped for long enough is there."""
-        return doubt if (now_ns - doubt.since_ns) * _NS <= self.settings.doubt_for else NO_DOUBT
-
-    def settled(self, belief: Belief, before: bool) -> bool:
-        """Whether the leader's direction is known well enough, for a track that was settled before or not.
-
-        The first few measurements may make a leader seem faster than any is, and its direction the better
-        known by as much. What is above k_v therefore doesn't help to settle, unless the settings let it.
-        """
-        settings, limits, speed = self.settings, self.estimator.model.limits, belief.speed
-        if speed < 0.5 * limits.v_eps:
-            return False
-        if before:
-            return belief.sd_heading < settings.unsettled_heading
-        excess = max(1.0, speed / limits.k_v) if settings.capped_speed else 1.0
-        return belief.sd_heading * excess < settings.settled_heading
-
-    def _window_begin_ns(self, track: Track) -> int:
-        return track[-1].measurement.capture_ns - round(self.settings.window / _NS)
-
-    def _trim(self, track: Track) -> Track:
-        """Ring of the points in the window and the one before, which anything in the window can follow."""
-        oldest_ns = self._window_begin_ns(track)
-        first = next(i for i, point in enumerate(track) if point.measurement.capture_ns >= oldest_ns)
-        return track[first - 1 :] if first > 1 else track
+    anew = begun(measurement, filter)
+    tentative = joined(last.tentative, measurement, filter, gate_of(settings))
+    if tentative.frames < settings.reacquire_frames:
+        return anew._replace(tentative=tentative)
+    settled = is_settled(tentative.belief, False, settings, filter.limits)
+    return anew._replace(belief=tentative.belief, settled=settled)
 
 
-def cause_at(track: Track, capture_ns: int) -> Cause | None:
-    """Why the measurement of a capture time was not used; None if it was, or the track does not have it."""
-    return next((point.cause for point in track if point.measurement.capture_ns == capture_ns), None)
+@kernel
+def _taken_over(rejected: TrackPoint, settings: TrackSettings, filter: Filter) -> TrackPoint:
+    """Point of a tentative track that takes over, uncertain by its jump; the rejected one otherwise.
+
+    It does not while it is not ripe, nor by a jump that would turn the line between the robots, and with it
+    alpha1 and alpha2, by more than ``followed_turn``.
+    """
+    tentative, measurement = rejected.tentative, rejected.measurement
+    if tentative.frames < settings.reacquire_frames:
+        return rejected
+    prior, leader_fits = rejected.belief, rejected.nis <= gate_of(settings)
+    jump = jumped(rejected.jump, measurement, prior, rejected.check, leader_fits)
+    if line_turn(jump, measurement) > settings.followed_turn:
+        return rejected
+    belief = filter.update(prior, measurement) if leader_fits else tentative.belief
+    check = check_from(measurement) if measurement.framed else rejected.check
+    return rejected._replace(
+        belief=belief,
+        verdict=RESTARTED,
+        used_ns=measurement.capture_ns,
+        settled=is_settled(belief, leader_fits and rejected.settled, settings, filter.limits),
+        tentative=no_tentative(belief),
+        check=check,
+        cause=BELIEVED,
+        jump=jump,
+    )
+
+
+@kernel
+def _lasting(jump: JumpUncertainty, now_ns: int, settings: TrackSettings) -> JumpUncertainty:
+    """Uncertainty as it is now: a body that has stayed where it jumped for long enough is there."""
+    if (now_ns - jump.since_ns) * _NS <= settings.doubt_for:
+        return jump
+    return JumpUncertainty(0.0, 0.0, 0)
+
+
+# The rewind ring
+
+
+@kernel
+def point_at(points: Rows[TrackPoint], ring: Ring, k: int) -> TrackPoint:
+    """The ring's k-th point, the oldest being the 0th."""
+    return load(TrackPoint, points, place(ring, points, k))
+
+
+@kernel
+def newest(points: Rows[TrackPoint], ring: Ring) -> TrackPoint:
+    """The ring's newest point."""
+    return load(TrackPoint, points, place(ring, points, ring.length - 1))
+
+
+@kernel
+def capture_at(points: Rows[TrackPoint], ring: Ring, k: int) -> int:
+    """Capture time of the ring's k-th point."""
+    return point_at(points, ring, k).measurement.capture_ns
+
+
+@kernel
+def place_of(points: Rows[TrackPoint], ring: Ring, capture_ns: int) -> int:
+    """Number of the points captured before a time."""
+    k = ring.length
+    while k > 0 and capture_at(points, ring, k - 1) >= capture_ns:
+        k -= 1
+    return k
+
+
+@kernel
+def add(
+    points: Rows[TrackPoint], ring: Ring, measurement: Measurement, settings: TrackSettings, filter: Filter
+) -> Added:
+    """Fold a measurement in at its place in time; tell what became of it.
+
+    A measurement of a capture time that the track has is a DUPLICATE, one from before the window or before
+    the track began is LATE: both leave the track as it is. The verdict of one folded in late is that at its
+    own place. Points that come too close together for the whole window to fit push the oldest out.
+    """
+    n = ring.length
+    if n == 0 or measurement.capture_ns <= capture_at(points, ring, n - 1):
+        return _inserted(points, ring, measurement, settings, filter)
+    point = follow(point_at(points, ring, n - 1), measurement, settings, filter)
+    if n == size(points):
+        ring, n = Ring(place(ring, points, 1), n - 1), n - 1
+    store(points, place(ring, points, n), point)
+    return Added(trimmed(points, Ring(ring.first, n + 1), settings), point.verdict, point.cause)
+
+
+@kernel(inline=False)
+def _inserted(
+    points: Rows[TrackPoint], ring: Ring, measurement: Measurement, settings: TrackSettings, filter: Filter
+) -> Added:
+    """Fold in a measurement that is the first, or not the newest."""
+    n, capture_ns = ring.length, measurement.capture_ns
+    if n == 0:
+        store(points, place(ring, points, 0), begun(measurement, filter))
+        return Added(Ring(ring.first, 1), RESTARTED, BELIEVED)
+    k = place_of(points, ring, capture_ns)
+    if capture_at(points, ring, k) == capture_ns:
+        return Added(ring, DUPLICATE, BELIEVED)
+    if n == size(points):
+        ring, n, k = Ring(place(ring, points, 1), n - 1), n - 1, k - 1
+    if k <= 0 or capture_ns < capture_at(points, ring, n - 1) - window_ns(settings):
+        return Added(ring, LATE, BELIEVED)
+    for at in range(n, k, -1):
+        store(points, place(ring, points, at), point_at(points, ring, at - 1))
+    here = point_at(points, ring, k)
+    store(points, place(ring, points, k), here._replace(measurement=measurement))
+    ring = Ring(ring.first, n + 1)
+    reprocessed(points, ring, k, settings, filter)
+    here = point_at(points, ring, k)
+    return Added(trimmed(points, ring, settings), here.verdict, here.cause)
+
+
+@kernel
+def window_ns(settings: TrackSettings) -> int:
+    """How far back the ring reaches."""
+    return int(math.floor(settings.window / _NS + 0.5))
+
+
+@kernel
+def trimmed(points: Rows[TrackPoint], ring: Ring, settings: TrackSettings) -> Ring:
+    """Ring of the points in the window and the one before, which anything in the window can follow."""
+    oldest_ns = capture_at(points, ring, ring.length - 1) - window_ns(settings)
+    first = 0
+    while capture_at(points, ring, first) < oldest_ns:
+        first += 1
+    if first <= 1:
+        return ring
+    return Ring(place(ring, points, first - 1), ring.length - first + 1)
+
+
+@kernel(inline=False)
+def reprocessed(
+    points: Rows[TrackPoint], ring: Ring, k: int, settings: TrackSettings, filter: Filter
+) -> int:
+    """Fold the points from the k-th on anew, whose measurements have changed in place; tell how many.
+
+    The oldest point keeps its belief: what that rests on is gone.
+    """
+    first = max(k, 1)
+    point = point_at(points, ring, first - 1)
+    for at in range(first, ring.length):
+        point = follow(point, point_at(points, ring, at).measurement, settings, filter)
+        store(points, place(ring, points, at), point)
+    return ring.length - first
+
+
+@kernel
+def with_motion(point: TrackPoint, motion: FollowerMotion) -> TrackPoint:
+    """Point whose measurement has another motion of the follower; its belief is still the old one."""
+    return point._replace(measurement=point.measurement._replace(motion=motion))

@@ -1,0 +1,108 @@
+"""The filters of the loop as one record: EKF, UKF and differences, in either frame.
+
+A filter is one object with ``start``, ``predict``, ``update`` and ``step``. These are records, so that compiled
+code has them by value; estimators that cannot be compiled offer the same four (:mod:`.interpreted`).
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+from estimation.filters.belief import Belief, nis_of, started
+from estimation.filters.difference import differenced, first_difference
+from estimation.filters.ekf import extended_moved, informed, mean_of, seen_by_follower
+from estimation.filters.model import Model
+from estimation.filters.ukf import unscented_moved
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, moved
+from estimation.models.measurement import FrontEnd, Measurement
+from formation.arc import swing
+from formation.kernel import kernel
+
+
+class Kind(IntEnum):
+    """Filters that there are as records."""
+
+    EKF = 0
+    UKF = 1
+    DIFFERENCE = 2
+
+
+UKF = Kind.UKF.value
+DIFFERENCE = Kind.DIFFERENCE.value
+
+
+class Stepped(NamedTuple):
+    """Belief after a step, and the NIS of its measurement."""
+
+    belief: Belief
+    nis: float
+
+
+class Filter(NamedTuple):
+    """A filter of a kind: ``in_world`` or along the follower's axes, with limits and noise of the leader.
+
+    ``correlation`` [s]: of the errors of v2 and u2. ``cutoff`` [s]: of the low-pass behind differences.
+    """
+
+    kind: int
+    in_world: bool
+    limits: LeaderLimits
+    noise: ProcessNoise
+    correlation: float
+    cutoff: float
+
+    @property
+    def model(self) -> Model:
+        """The same model for estimators in matrices."""
+        front_end = FrontEnd.WORLD if self.in_world else FrontEnd.BODY
+        return Model(front_end, self.limits, self.noise, self.correlation)
+
+    @kernel
+    def start(self, measurement: Measurement) -> Belief:
+        """Belief from the first measurement alone."""
+        if self.kind == DIFFERENCE:
+            return first_difference(measurement, self.limits)
+        return started(measurement.x, measurement.y, measurement.spread, self.limits)
+
+    @kernel
+    def predict(self, belief: Belief, dt: float, follower: FollowerMotion) -> Belief:
+        """Belief after dt [s], the follower having moved as given."""
+        if self.kind == UKF:
+            ahead = unscented_moved(belief, dt, self.noise)
+        else:
+            ahead = extended_moved(belief, dt, self.noise)
+        if self.kind == DIFFERENCE:
+            rates = belief.rates
+            ahead = ahead._replace(rates=rates._replace(elapsed=rates.elapsed + dt))
+        if self.in_world:
+            return ahead
+        centre = moved(mean_of(belief), swing(belief.u, dt))
+        return seen_by_follower(ahead, centre, dt, follower, self.correlation)
+
+    @kernel
+    def update(self, belief: Belief, measurement: Measurement) -> Belief:
+        """Belief after a measurement at the belief's time."""
+        if self.kind == DIFFERENCE:
+            return differenced(belief, measurement, self.limits, self.cutoff)
+        return informed(belief, measurement.x, measurement.y, measurement.spread)
+
+    @kernel
+    def step(
+        self, belief: Belief, dt: float, follower: FollowerMotion, measurement: Measurement, gate: float
+    ) -> Stepped:
+        """Belief after dt [s] and a measurement at the end of it, and the NIS of this measurement.
+
+        One whose NIS is above ``gate``, or is not a number, is left out: the belief is then the prediction.
+        """
+        prior = self.predict(belief, dt, follower)
+        nis = nis_of(prior, measurement.x, measurement.y, measurement.spread)
+        if nis <= gate:
+            return Stepped(self.update(prior, measurement), nis)
+        return Stepped(prior, nis)
+
+
+def filter_of(kind: Kind, model: Model, cutoff: float = 0.1) -> Filter:
+    """Filter of a kind on a model."""
+    in_world = model.front_end is FrontEnd.WORLD
+    return Filter(kind.value, in_world, model.limits, model.noise, model.input_correlation, cutoff)

@@ -1,0 +1,111 @@
+"""The track of a leader: its point right after one measurement, and what else is known there."""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+from typing import NamedTuple
+
+from estimation.filters.belief import Belief
+from estimation.filters.filter import Filter
+from estimation.models.coordinated_turn import FollowerMotion
+from estimation.models.measurement import Measurement
+from estimation.tracking.follower_check import BELIEVED, FollowerCheck, check_from
+from formation.kernel import kernel
+from formation.pose import Pose
+
+
+class Verdict(IntEnum):
+    """What became of a measurement."""
+
+    USED = 0
+    GATED = 1
+    RESTARTED = 2
+    LATE = 3
+    DUPLICATE = 4
+
+    @property
+    def word(self) -> str:
+        """The name that it is counted by."""
+        return _WORDS[self]
+
+
+_WORDS = ("used", "gated", "restarted", "too_late", "duplicate")
+
+USED = Verdict.USED.value
+GATED = Verdict.GATED.value
+RESTARTED = Verdict.RESTARTED.value
+LATE = Verdict.LATE.value
+DUPLICATE = Verdict.DUPLICATE.value
+
+
+class JumpUncertainty(NamedTuple):
+    """A jump that was followed without being explained: either where it led is wrong, or where it began.
+
+    position [m] and heading [rad] of the follower: sums of the jumps. since_ns: capture time of the last.
+    """
+
+    position: float
+    heading: float
+    since_ns: int
+
+
+NO_JUMP = JumpUncertainty(0.0, 0.0, 0)
+
+
+class TentativeTrack(NamedTuple):
+    """A second track made of rejected measurements only, waiting for enough of them to agree.
+
+    frames: how many it is made of, 0 for none. framed: whether the last one came from a mocap frame, with
+    the follower's pose in it.
+    """
+
+    belief: Belief
+    capture_ns: int
+    motion: FollowerMotion
+    frames: int
+    framed: bool
+    pose: Pose
+
+
+class TrackPoint(NamedTuple):
+    """The track right after one measurement.
+
+    verdict: a :class:`Verdict`; cause: why the measurement was not used, a
+    :class:`~estimation.tracking.follower_check.Cause`. used_ns: capture time of the newest one that was used.
+    """
+
+    measurement: Measurement
+    belief: Belief
+    verdict: int
+    nis: float
+    used_ns: int
+    settled: bool
+    tentative: TentativeTrack
+    check: FollowerCheck
+    cause: int
+    jump: JumpUncertainty
+
+
+@kernel
+def no_tentative(belief: Belief) -> TentativeTrack:
+    """No tentative track; its fields must hold something, so take the belief."""
+    return TentativeTrack(belief, 0, FollowerMotion(0.0, 0.0, 0.0, 0.0), 0, False, Pose(0.0, 0.0, 0.0))
+
+
+@kernel
+def begun(measurement: Measurement, filter: Filter) -> TrackPoint:
+    """First point of a track that knows nothing but this measurement."""
+    belief = filter.start(measurement)
+    return TrackPoint(
+        measurement,
+        belief,
+        RESTARTED,
+        math.nan,
+        measurement.capture_ns,
+        False,
+        no_tentative(belief),
+        check_from(measurement),
+        BELIEVED,
+        JumpUncertainty(0.0, 0.0, 0),
+    )
