@@ -47,6 +47,7 @@ def endpoint() -> Iterator[str]:
         yield reserved
 
 
+@pytest.mark.slow
 def test_daemons_started_by_hand_find_each_other_and_end_when_told(tmp_path: Path, endpoint: str) -> None:
     daemons = {
         "recorder": daemon("recorder", tmp_path, "--listen", endpoint, "--out", "lab.mcap"),

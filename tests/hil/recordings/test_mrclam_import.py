@@ -144,6 +144,7 @@ def first_minute(out: Path, leader: int, follower: int) -> Path:
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.real
 def test_a_real_leader_is_followed_and_commands_are_seen_to_run_ahead(tmp_path: Path) -> None:
     import_mrclam(first_minute(tmp_path / "mrclam6", 1, 2), 1, 2, tmp_path / "real.mcap")
