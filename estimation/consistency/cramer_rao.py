@@ -27,7 +27,7 @@ from formation.pose import Pose
 _NS = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class TruePath:
     """What really happened at n capture times, in the mocap frame.
 

@@ -26,7 +26,7 @@ class Rates:
     samples: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Modes:
     """Memory of an estimator of several models: the belief of each, and the probability that it holds."""
 
@@ -104,7 +104,7 @@ class Model:
         return motion.process_noise_body(mean, dt, self.noise, follower, self.input_correlation)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Innovation:
     """What a measurement adds to a prediction: the residual (2,), its covariance (2, 2), and the NIS."""
 

@@ -42,7 +42,7 @@ class PairSeen:
     noise: PoseNoise
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
     """The leader's position at one capture time, and what belongs to that moment.
 

@@ -53,7 +53,7 @@ class OwnNoise:
     u_max: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class OwnPoint:
     """The filter right after one pose: mean (5,), covariance (5, 5).
 

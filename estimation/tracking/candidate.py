@@ -16,7 +16,7 @@ from formation.angles import wrap
 _NS = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
     """A second belief made of rejected measurements only, waiting for enough of them to agree."""
 

@@ -17,7 +17,7 @@ from formation.angles import wrap
 QUANTITIES = ("rho_dot", "alpha2_dot", "v1", "alpha1", "u1")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
     """What the follower believes at ``capture_ns``, seen from its own body.
 

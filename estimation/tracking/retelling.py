@@ -22,9 +22,10 @@ def retold(tracker: Tracker, track: Track, since_ns: int, motion_at: MotionAt) -
     if place == len(track):
         return track
     told = [point.measurement for point in track[place:]]
-    due = [replace(each, motion=motion_at(each.capture_ns) or each.motion) for each in told]
-    if due == told:
+    motions = [motion_at(each.capture_ns) or each.motion for each in told]
+    if motions == [each.motion for each in told]:
         return track
+    due = [replace(each, motion=motion) for each, motion in zip(told, motions, strict=True)]
     points = list(track[:place])
     if not points:
         points, due = [replace(track[0], measurement=due[0])], due[1:]

@@ -82,7 +82,7 @@ class TrackSettings:
     followed_turn: float = 0.25
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class TrackPoint:
     """The track right after one measurement.
 
