@@ -26,7 +26,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from hil.emulator import node as emulator
 from hil.lockstep.lockstep import EPOCH_NS, Lockstep
-from hil.nodes import controller, estimator, lockstep_run
+from hil.lockstep.run import START_TIMEOUT_NS, make_nodes
+from hil.nodes import controller, estimator
 from hil.nodes import node as nodes
 from hil.nodes.node import Outgoing
 from hil.scenario.files import load_scenario
@@ -70,10 +71,10 @@ def fly_in_python(scenario: Scenario) -> list[tuple[float, float]]:
             sent.append((command.v2, command.u2))
 
     with messages_as_objects():
-        loop = Lockstep(lockstep_run.make_nodes(scenario), keep)
+        loop = Lockstep(make_nodes(scenario), keep)
         while (since_ns := loop.state_of("emulator").motion_since_ns) is None:
             loop.run_until(loop.now_ns + 10_000_000)
-            assert loop.now_ns < EPOCH_NS + lockstep_run.START_TIMEOUT_NS
+            assert loop.now_ns < EPOCH_NS + START_TIMEOUT_NS
         loop.run_until(since_ns + round(scenario.run.duration_s * 1e9))
     return sent
 

@@ -25,7 +25,7 @@ class IntegrationError(ArithmeticError):
     """The integrator could not go on: the robots met, or the law gave something that is not finite."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
     """A pair over time. All arrays have one row per time in ``t``.
 

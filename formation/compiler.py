@@ -62,7 +62,7 @@ def compiled(function: Callable[..., Any]) -> Any:
 
 @contextlib.contextmanager
 def _collector_paused() -> Iterator[None]:
-    """Compiling makes millions of objects that live until its end: looking through them takes a fifth of it."""
+    """Compiling makes millions of objects that live to its end: looking through them takes a fifth of it."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:

@@ -1,8 +1,9 @@
 """Kernels are optimised once, within the entry that they end in.
 
-Left to itself numba optimises every function that is called from another one on its own, down to machine code,
-with all that it calls: through ten levels of kernels most of it ten times. Here a kernel only becomes code that
-can be linked. The library of an entry links the kernels below it, all of them once, and is optimised as a whole.
+Left to itself numba optimises every function that is called from another one on its own, down to machine
+code, with all that it calls: through ten levels of kernels most of it ten times. Here a kernel only becomes
+code that can be linked. The library of an entry links the kernels below it, all of them once, and is
+optimised as a whole.
 """
 
 from __future__ import annotations

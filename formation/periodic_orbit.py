@@ -28,7 +28,7 @@ _DIFFERENCE_STEP = 1e-5
 PeriodMap = Callable[[FloatArray], FloatArray]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class PeriodicOrbit:
     """One period of the reduced system (5), that is on the manifold alpha2 = pi/2 (or the station's).
 

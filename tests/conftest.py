@@ -30,7 +30,21 @@ SLOWEST = (
 """Files whose tests take longest, the longest first: begun last, one would keep a worker busy alone."""
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the slowest files; all others keep their order."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what needs recordings that are not at hand; begin with the slowest files."""
+    if "ABREAST_REAL" not in os.environ:
+        left_out = [item for item in items if item.get_closest_marker("real")]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in left_out]
     places = {path: place for place, path in enumerate(SLOWEST)}
     items.sort(key=lambda item: places.get(item.nodeid.partition("::")[0], len(places)))
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Where ABREAST_NO_SKIPS is set, as in CI, a test that was skipped is one that failed."""
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+    if "ABREAST_NO_SKIPS" not in os.environ or reporter is None:
+        return
+    for report in reporter.stats.get("skipped", ()):
+        reporter.write_line(f"skipped, which ABREAST_NO_SKIPS forbids: {report.nodeid}")
+        session.exitstatus = session.exitstatus or pytest.ExitCode.TESTS_FAILED

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 import re
 import tomllib
 import zipfile
@@ -25,6 +26,23 @@ PACKAGES = {
     "hil": {"hil", "controllers", "estimation", "formation"},
 }
 """Packages, and those of them that each may import."""
+
+ROOMS = {
+    "estimation": (
+        "models", "own_motion", "time", "filters", "tracking", "bounds", "consistency", "calibration",
+    ),
+    "hil": (
+        "scenario", "wire", "log", "nodes", "emulator", "lockstep", "live", "replay", "recordings", "judge",
+        "figures", "reports", "sweep", "simulate", "commands",
+    ),
+}  # fmt: skip
+"""Rooms of the packages that have some, lower ones first: each may import those before it."""
+
+HALL = {"estimation": set[str](), "hil": {"__main__", "command_line", "errors"}}
+"""What lies outside all rooms of a package, besides its ``__init__``."""
+
+FROM_HALL = {"hil", "hil.errors"}
+"""What the rooms may import from there."""
 
 PURE = ("formation", "controllers", "estimation")
 WORLDLY = {
@@ -57,6 +75,25 @@ def imported(path: Path) -> set[str]:
     return names
 
 
+def modules_imported(source: str) -> set[str]:
+    """Modules of the packages that a source imports, wherever in it, by their dotted names."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            whole = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {name if name in NAMES else str(node.module) for name in whole}
+    return found & NAMES
+
+
+def dotted(path: Path) -> str:
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+NAMES = {dotted(path) for path in MODULES}
+
+
 def called(path: Path) -> set[str]:
     """Plain names that a module calls."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -79,6 +116,58 @@ def test_a_module_keeps_to_its_floor(path: Path) -> None:
         assert not called(path) & {"open", "print", "input", "exec", "eval", "__import__"}
     assert len(path.read_text(encoding="utf-8").splitlines()) <= LONGEST_MODULE or named(path) in LONGER
     assert not set(path.stem.split("_")) & NAMELESS
+
+
+def room_of(name: str) -> str:
+    return name.split(".")[1] if "." in name else ""
+
+
+def misplaced(name: str, source: str) -> set[str]:
+    """What a module imports from a room above its own, or from outside the rooms without leave."""
+    package, room = name.partition(".")[0], room_of(name)
+    if room not in ROOMS[package]:
+        return set()
+    below = set(ROOMS[package][: ROOMS[package].index(room) + 1])
+    within = {other for other in modules_imported(source) if other.partition(".")[0] == package}
+    return {other for other in within - FROM_HALL if room_of(other) not in below}
+
+
+@pytest.mark.parametrize(
+    "path", [path for path in MODULES if dotted(path).partition(".")[0] in ROOMS], ids=named
+)
+def test_a_module_keeps_to_its_room(path: Path) -> None:
+    assert not misplaced(dotted(path), path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    ("name", "source"),
+    [
+        ("hil.wire.topics", "import hil.log.reader"),
+        ("hil.wire.topics", "def late() -> None:\n    from hil.log import reader"),
+        ("hil.log.reader", "from hil.command_line import main"),
+        ("estimation.models.motion", "from estimation.filters.belief import Belief"),
+    ],
+)
+def test_an_import_from_above_is_found(name: str, source: str) -> None:
+    assert misplaced(name, source)
+
+
+def test_nothing_lies_outside_the_rooms() -> None:
+    for package, rooms in ROOMS.items():
+        parts = [
+            path.relative_to(ROOT / package).parts for path in MODULES if path.is_relative_to(ROOT / package)
+        ]
+        assert {part for part, *inner in parts if inner} == set(rooms)
+        assert {part for part, *inner in parts if not inner} == {
+            f"{name}.py" for name in HALL[package] | {"__init__"}
+        }
+
+
+def test_no_module_imports_itself_by_way_of_others() -> None:
+    graph = {dotted(path): modules_imported(path.read_text(encoding="utf-8")) for path in MODULES}
+    graphlib.TopologicalSorter(graph).prepare()
+    with pytest.raises(graphlib.CycleError):
+        graphlib.TopologicalSorter(graph | {"hil.errors": {"hil.command_line"}}).prepare()
 
 
 def test_there_are_no_other_packages() -> None:

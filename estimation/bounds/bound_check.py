@@ -37,7 +37,7 @@ ROUNDING = 256.0 * float(np.finfo(np.float64).eps)
 """What rounding alone can make of an error, in SI units: see :func:`check`."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class SpeedInputs:
     """What the speed law (8) looks at: rho [m], v1 [m/s], alpha1 [rad]; floats or arrays of shape (n,)."""
 

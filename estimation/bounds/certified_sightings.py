@@ -26,7 +26,7 @@ import numpy as np
 from estimation.bounds.certified import Certain, Failed, Interval, certain_alpha1, certain_motion, window_ns
 from estimation.bounds.guarantees import guaranteed_rate, guaranteed_window
 from estimation.bounds.recent import Recent, with_recent
-from estimation.own_motion.inputs import History
+from estimation.own_motion.odometry_history import History
 from formation.angles import FloatArray, wrap
 
 LONGEST_WINDOW = 1.5

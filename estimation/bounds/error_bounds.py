@@ -26,7 +26,7 @@ from formation.station import ABREAST, Station
 Values = float | FloatArray
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RateErrors:
     """Bounds of the rate errors: |rho_dot error| <= M_rho [m/s], |alpha2_dot error| <= M_alpha2 [rad/s].
 
@@ -40,7 +40,7 @@ class RateErrors:
         _require_magnitudes(M_rho=self.M_rho, M_alpha2=self.M_alpha2)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class InputErrors:
     """Bounds of the errors of what the follower knows of itself; all zero in the paper's appendix.
 
@@ -56,7 +56,7 @@ class InputErrors:
         _require_magnitudes(E_rho=self.E_rho, E_alpha2=self.E_alpha2, E_v2=self.E_v2, E_u2=self.E_u2)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Perceived:
     """What the follower believes at one moment: the hat quantities, each a float or an array of shape (n,).
 

@@ -17,17 +17,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.filters.belief import Belief, Model
-from estimation.models.measurement import FrontEnd, Measurement, PoseNoise
-from estimation.models.motion import STATE_SIZE, FollowerMotion, Matrix, Vector
+from estimation.filters.belief import Model
+from estimation.filters.gaussian import Gaussian
+from estimation.models.coordinated_turn import FollowerMotion
+from estimation.models.measurement import FrontEnd, Measurement, PoseNoise, measure_world
+from estimation.models.motion import STATE_SIZE, Matrix, Vector
 from estimation.tracking.estimate import QUANTITIES, estimate_of
+from estimation.tracking.track_point import NO_JUMP
 from estimation.tracking.tracker import Status
 from formation.pose import Pose
 
 _NS = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class TruePath:
     """What really happened at n capture times, in the mocap frame.
 
@@ -79,7 +82,7 @@ def state_bound(path: TruePath, model: Model, sigma_position: float) -> NDArray[
             if measured:
                 covariance = _informed(covariance, noise)
         elif measured:
-            covariance = model.start(Measurement(int(now_ns), mean[0:2], noise, still)).covariance
+            covariance = model.start(Measurement.at(int(now_ns), mean[0:2], noise, still)).covariance
         if covariance is not None:
             bounds[k] = covariance
     return bounds
@@ -108,15 +111,11 @@ def cramer_rao(
     for k in np.flatnonzero(known if wanted is None else known & wanted):
         mean = path.leader[k]
         v2, u2 = path.follower_motion[k].tolist()
-        here = Measurement(
-            capture_ns=int(path.capture_ns[k]),
-            position=mean[0:2],
-            covariance=pose_noise.position**2 * np.eye(2),
-            motion=FollowerMotion(v2, u2, sd_v2, sd_u2),
-            pose=Pose(*path.follower_pose[k].tolist()),
-            pose_noise=pose_noise,
-        )
-        mapped = estimate_of(Belief(mean, states[k]), here, Status.TRACKING, math.nan, here.capture_ns)
+        motion, pose = FollowerMotion(v2, u2, sd_v2, sd_u2), Pose(*path.follower_pose[k].tolist())
+        x, y = mean[0:2].tolist()
+        here = measure_world(int(path.capture_ns[k]), (x, y), pose, pose_noise, motion)
+        belief = Gaussian.of(mean, states[k])
+        mapped = estimate_of(belief, here, Status.TRACKING, math.nan, here.capture_ns, NO_JUMP)
         deviations[k] = np.sqrt(np.diag(mapped.covariance))
     return {name: deviations[:, column] for column, name in enumerate(QUANTITIES)}
 

@@ -26,10 +26,11 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.filters.belief import Belief, Model
-from estimation.filters.estimator import Estimator
+from estimation.filters.estimator import Estimator, MatrixStep
 from estimation.filters.memory import Excitation, SensorOffsets
+from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import FrontEnd, Measurement
-from estimation.models.motion import STATE_SIZE, FollowerMotion, Matrix, Vector
+from estimation.models.motion import STATE_SIZE, Matrix, Vector
 
 _MEMORY = 10.0  # seconds over which the pair must have moved against each other
 _CLEAR = 3.0  # how many standard deviations of the leader's direction a change must be worth
@@ -80,9 +81,9 @@ class BiasedExtended(Estimator):
 
     def step(
         self, belief: Belief, dt: float, follower: FollowerMotion, measurement: Measurement, gate: float
-    ) -> tuple[Belief, float]:
+    ) -> MatrixStep:
         """As :meth:`Estimator.step`; the NIS knows of the offsets."""
-        return self._taken_in(self.predict(belief, dt, follower), measurement, gate)
+        return MatrixStep(*self._taken_in(self.predict(belief, dt, follower), measurement, gate))
 
     def _taken_in(self, belief: Belief, measurement: Measurement, gate: float) -> tuple[Belief, float]:
         offsets = offsets_of(belief)

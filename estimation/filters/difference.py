@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from estimation.filters.belief import Belief, Rates, started
+from estimation.filters.gaussian import Gaussian, Rates, started
 from estimation.models.coordinated_turn import LeaderLimits, Spread
 from estimation.models.measurement import Measurement
 from formation.angles import wrapped
@@ -19,7 +19,7 @@ from formation.kernel import kernel
 
 
 class Polar(NamedTuple):
-    """Range [m] and bearing [rad] of the leader seen from the follower, and the heading they are seen from."""
+    """Range [m] and bearing [rad] of the leader from the follower, and the heading they are seen from."""
 
     rho: float
     alpha2: float
@@ -37,7 +37,7 @@ def polar_of(measurement: Measurement) -> Polar:
 
 
 @kernel
-def first_difference(measurement: Measurement, limits: LeaderLimits) -> Belief:
+def first_difference(measurement: Measurement, limits: LeaderLimits) -> Gaussian:
     """Belief from the first measurement alone: no rates yet."""
     seen = polar_of(measurement)
     begun = started(measurement.x, measurement.y, measurement.spread, limits)
@@ -45,7 +45,7 @@ def first_difference(measurement: Measurement, limits: LeaderLimits) -> Belief:
 
 
 @kernel(inline=False)
-def differenced(b: Belief, measurement: Measurement, limits: LeaderLimits, cutoff: float) -> Belief:
+def differenced(b: Gaussian, measurement: Measurement, limits: LeaderLimits, cutoff: float) -> Gaussian:
     """Belief after a measurement: difference it against the last one and smooth."""
     last = b.rates
     dt = last.elapsed
@@ -82,7 +82,7 @@ class _Smoothing(NamedTuple):
 
 
 @kernel
-def _uncertain(b: Belief, measurement: Measurement, limits: LeaderLimits, by: _Smoothing) -> Belief:
+def _uncertain(b: Gaussian, measurement: Measurement, limits: LeaderLimits, by: _Smoothing) -> Gaussian:
     """Belief with the covariance right after an update.
 
     A smoothed difference of white noise has the variance sigma^2 (gain/dt)^2 2/(2 - gain). The motion of the

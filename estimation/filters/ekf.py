@@ -6,7 +6,7 @@ Joseph's form for a measured position with its full covariance. Nothing of the s
 
 from __future__ import annotations
 
-from estimation.filters.belief import Belief
+from estimation.filters.gaussian import Gaussian
 from estimation.models.coordinated_turn import (
     FollowerMotion,
     ProcessNoise,
@@ -26,13 +26,13 @@ from formation.kernel import kernel
 
 
 @kernel
-def mean_of(b: Belief) -> State:
+def mean_of(b: Gaussian) -> State:
     """Mean of a belief."""
     return State(b.x, b.y, b.vx, b.vy, b.u)
 
 
 @kernel
-def extended_moved(b: Belief, dt: float, noise: ProcessNoise) -> Belief:
+def extended_moved(b: Gaussian, dt: float, noise: ProcessNoise) -> Gaussian:
     """Carry a belief through dt [s] in a fixed frame: the covariance by the Jacobian of the motion."""
     t = swing(b.u, dt)
     before = mean_of(b)
@@ -78,7 +78,7 @@ def extended_moved(b: Belief, dt: float, noise: ProcessNoise) -> Belief:
 
 
 @kernel
-def driven(b: Belief, before: State, dt: float, noise: ProcessNoise) -> Belief:
+def driven(b: Gaussian, before: State, dt: float, noise: ProcessNoise) -> Gaussian:
     """Belief with the noise of dt [s] of a leader whose state was ``before``."""
     a = acceleration(before.vx, before.vy, noise)
     twice, thrice = 0.5 * dt * dt, dt * dt * dt * (1.0 / 3.0)
@@ -98,7 +98,7 @@ def driven(b: Belief, before: State, dt: float, noise: ProcessNoise) -> Belief:
 
 
 @kernel
-def turned(b: Belief, c: float, s: float) -> Belief:
+def turned(b: Gaussian, c: float, s: float) -> Gaussian:
     """Belief along axes that are turned by the angle of this cosine and sine."""
     cc, cs, ss = c * c, c * s, s * s
     return b._replace(
@@ -124,7 +124,7 @@ def turned(b: Belief, c: float, s: float) -> Belief:
 
 
 @kernel
-def spread_by(b: Belief, variance: float, g: Push) -> Belief:
+def spread_by(b: Gaussian, variance: float, g: Push) -> Gaussian:
     """Belief with an error of this variance in it, which pushes position and velocity as given."""
     wx, wy, wvx, wvy = variance * g.x, variance * g.y, variance * g.vx, variance * g.vy
     return b._replace(
@@ -143,8 +143,8 @@ def spread_by(b: Belief, variance: float, g: Push) -> Belief:
 
 @kernel
 def seen_by_follower(
-    ahead: Belief, centre: State, dt: float, own: FollowerMotion, correlation: float
-) -> Belief:
+    ahead: Gaussian, centre: State, dt: float, own: FollowerMotion, correlation: float
+) -> Gaussian:
     """Belief along the axes of a follower that moved for dt [s], out of one along its axes before.
 
     ``centre``: the state that the belief was linearised around, moved in the old axes. The errors of v2 and
@@ -159,7 +159,7 @@ def seen_by_follower(
 
 
 @kernel
-def informed(a: Belief, x: float, y: float, spread: Spread) -> Belief:
+def informed(a: Gaussian, x: float, y: float, spread: Spread) -> Gaussian:
     """Belief that has taken in that the leader was seen at (x, y) with this covariance."""
     ra, rb, rc = spread.xx, spread.xy, spread.yy
     p, q, r = a.x_x + ra, a.x_y + rb, a.y_y + rc

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
 
 from estimation.filters.belief import Belief, Model, innovation
+from estimation.filters.filter import Kind, Stepped, filter_of
+from estimation.filters.gaussian import Gaussian
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits
 from estimation.models.measurement import Measurement
-from estimation.models.motion import FollowerMotion
+
+
+class MatrixStep(NamedTuple):
+    """Belief in matrices after a step, and the NIS of its measurement."""
+
+    belief: Belief
+    nis: float
 
 
 class Estimator(Protocol):
-    """A recursive estimator: pure, its whole state is the belief.
+    """A recursive estimator in matrices: pure, its whole state is the belief.
 
     Those that derive from it have ``step`` out of their ``predict`` and ``update``.
     """
@@ -28,11 +37,85 @@ class Estimator(Protocol):
 
     def step(
         self, belief: Belief, dt: float, follower: FollowerMotion, measurement: Measurement, gate: float
-    ) -> tuple[Belief, float]:
+    ) -> MatrixStep:
         """Belief after dt [s] and a measurement at the end of it, and the NIS of this measurement.
 
         One whose NIS is above ``gate`` is left out: the belief is then the prediction.
         """
         prior = self.predict(belief, dt, follower)
         nis = innovation(prior, measurement).nis
-        return (self.update(prior, measurement) if nis <= gate else prior), nis
+        return MatrixStep(self.update(prior, measurement) if nis <= gate else prior, nis)
+
+
+class RecordFilter(Estimator):
+    """The EKF in the place of an estimator in matrices, for those that are made of several."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self._filter = filter_of(Kind.EKF, model)
+
+    def start(self, measurement: Measurement) -> Belief:
+        """Belief from the first measurement alone."""
+        return whole_of(self._filter.start(measurement))
+
+    def predict(self, belief: Belief, dt: float, follower: FollowerMotion) -> Belief:
+        """Belief after dt [s], the follower having moved as given."""
+        return whole_of(self._filter.predict(belief.gaussian, dt, follower))
+
+    def update(self, belief: Belief, measurement: Measurement) -> Belief:
+        """Belief after a measurement at the belief's time."""
+        return whole_of(self._filter.update(belief.gaussian, measurement))
+
+
+class Remembering(Gaussian):
+    """Mean and covariance as the loop has them, with the whole belief that they are of."""
+
+    whole: Belief
+
+
+class Interpreted:
+    """An estimator in matrices in the place of a :class:`~estimation.filters.filter.Filter`.
+
+    The functions of the loop take it as they are, in plain Python.
+    """
+
+    def __init__(self, estimator: Estimator) -> None:
+        self.estimator = estimator
+        self.limits: LeaderLimits = estimator.model.limits
+
+    @property
+    def model(self) -> Model:
+        """Model of the estimator."""
+        return self.estimator.model
+
+    def start(self, measurement: Measurement) -> Gaussian:
+        """See :meth:`Estimator.start`."""
+        return _remembering(self.estimator.start(measurement))
+
+    def predict(self, belief: Gaussian, dt: float, follower: FollowerMotion) -> Gaussian:
+        """See :meth:`Estimator.predict`."""
+        return _remembering(self.estimator.predict(whole_of(belief), dt, follower))
+
+    def update(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
+        """See :meth:`Estimator.update`."""
+        return _remembering(self.estimator.update(whole_of(belief), measurement))
+
+    def step(
+        self, belief: Gaussian, dt: float, follower: FollowerMotion, measurement: Measurement, gate: float
+    ) -> Stepped:
+        """See :meth:`Estimator.step`."""
+        stepped = self.estimator.step(whole_of(belief), dt, follower, measurement, gate)
+        return Stepped(_remembering(stepped.belief), stepped.nis)
+
+
+def whole_of(belief: Any) -> Belief:
+    """The belief in matrices behind a record, with its memory if it has one."""
+    if isinstance(belief, Remembering):
+        return belief.whole
+    return Belief(belief.mean, belief.covariance)
+
+
+def _remembering(belief: Belief) -> Remembering:
+    record = Remembering(*belief.gaussian)
+    record.whole = belief
+    return record

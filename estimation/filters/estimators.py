@@ -1,6 +1,7 @@
 """The registry of estimators: one name, one way to build each.
 
-An estimator's module is loaded when one is built, since the compiler and filterpy take a second to load.
+EKF, UKF and differences are records that compiled code has by value; all others are written in matrices and
+stay plain Python. Their modules are loaded when one is built, since filterpy takes a second to load.
 """
 
 from __future__ import annotations
@@ -9,19 +10,16 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from estimation.filters.belief import Model
-from estimation.filters.estimator import Estimator
+from estimation.filters.estimator import Estimator, RecordFilter
+from estimation.filters.filter import Filter, Kind, filter_of
 
 
-def _ekf(model: Model, _cutoff: float) -> Estimator:
-    from estimation.filters.compiled import CompiledExtended
-
-    return CompiledExtended(model)
+def _ekf(model: Model, _cutoff: float) -> Filter:
+    return filter_of(Kind.EKF, model)
 
 
-def _ukf(model: Model, _cutoff: float) -> Estimator:
-    from estimation.filters.compiled import CompiledUnscented
-
-    return CompiledUnscented(model)
+def _ukf(model: Model, _cutoff: float) -> Filter:
+    return filter_of(Kind.UKF, model)
 
 
 def _ekf_filterpy(model: Model, _cutoff: float) -> Estimator:
@@ -37,10 +35,9 @@ def _ukf_filterpy(model: Model, _cutoff: float) -> Estimator:
 
 
 def _imm(model: Model, _cutoff: float) -> Estimator:
-    from estimation.filters.compiled import CompiledExtended
     from estimation.filters.imm import InteractingModels
 
-    return InteractingModels(model, make_filter=CompiledExtended)
+    return InteractingModels(model, make_filter=RecordFilter)
 
 
 def _shape_ekf(model: Model, _cutoff: float) -> Estimator:
@@ -55,13 +52,11 @@ def _mhe(model: Model, _cutoff: float) -> Estimator:
     return MovingHorizon(model)
 
 
-def _difference(model: Model, cutoff: float) -> Estimator:
-    from estimation.filters.difference import DifferenceEstimator
-
-    return DifferenceEstimator(model, cutoff)
+def _difference(model: Model, cutoff: float) -> Filter:
+    return filter_of(Kind.DIFFERENCE, model, cutoff)
 
 
-ESTIMATORS: dict[str, Callable[[Model, float], Estimator]] = {
+ESTIMATORS: dict[str, Callable[[Model, float], Filter | Estimator]] = {
     "ekf": _ekf,
     "ukf": _ukf,
     "ekf-filterpy": _ekf_filterpy,
@@ -73,7 +68,7 @@ ESTIMATORS: dict[str, Callable[[Model, float], Estimator]] = {
 }
 
 
-def make_estimator(name: str, model: Model, cutoff: float = 0.1) -> Estimator:
+def make_estimator(name: str, model: Model, cutoff: float = 0.1) -> Filter | Estimator:
     """Build the estimator of a name in :data:`ESTIMATORS`; ``cutoff`` [s] is the low-pass of ``difference``.
 
     Raises KeyError for an unknown name.

@@ -1,7 +1,8 @@
 """The filters of the loop as one record: EKF, UKF and differences, in either frame.
 
-A filter is one object with ``start``, ``predict``, ``update`` and ``step``. These are records, so that compiled
-code has them by value; estimators that cannot be compiled offer the same four (:mod:`.interpreted`).
+A filter is one object with ``start``, ``predict``, ``update`` and ``step``. These are records, so that
+compiled code has them by value; estimators that cannot be compiled offer the same four
+(:class:`estimation.filters.estimator.Interpreted`).
 """
 
 from __future__ import annotations
@@ -9,10 +10,10 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import NamedTuple
 
-from estimation.filters.belief import Belief, nis_of, started
+from estimation.filters.belief import Model
 from estimation.filters.difference import differenced, first_difference
 from estimation.filters.ekf import extended_moved, informed, mean_of, seen_by_follower
-from estimation.filters.model import Model
+from estimation.filters.gaussian import Gaussian, nis_of, started
 from estimation.filters.ukf import unscented_moved
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, moved
 from estimation.models.measurement import FrontEnd, Measurement
@@ -35,7 +36,7 @@ DIFFERENCE = Kind.DIFFERENCE.value
 class Stepped(NamedTuple):
     """Belief after a step, and the NIS of its measurement."""
 
-    belief: Belief
+    belief: Gaussian
     nis: float
 
 
@@ -59,14 +60,14 @@ class Filter(NamedTuple):
         return Model(front_end, self.limits, self.noise, self.correlation)
 
     @kernel
-    def start(self, measurement: Measurement) -> Belief:
+    def start(self, measurement: Measurement) -> Gaussian:
         """Belief from the first measurement alone."""
         if self.kind == DIFFERENCE:
             return first_difference(measurement, self.limits)
         return started(measurement.x, measurement.y, measurement.spread, self.limits)
 
     @kernel
-    def predict(self, belief: Belief, dt: float, follower: FollowerMotion) -> Belief:
+    def predict(self, belief: Gaussian, dt: float, follower: FollowerMotion) -> Gaussian:
         """Belief after dt [s], the follower having moved as given."""
         if self.kind == UKF:
             ahead = unscented_moved(belief, dt, self.noise)
@@ -81,7 +82,7 @@ class Filter(NamedTuple):
         return seen_by_follower(ahead, centre, dt, follower, self.correlation)
 
     @kernel
-    def update(self, belief: Belief, measurement: Measurement) -> Belief:
+    def update(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
         """Belief after a measurement at the belief's time."""
         if self.kind == DIFFERENCE:
             return differenced(belief, measurement, self.limits, self.cutoff)
@@ -89,7 +90,7 @@ class Filter(NamedTuple):
 
     @kernel
     def step(
-        self, belief: Belief, dt: float, follower: FollowerMotion, measurement: Measurement, gate: float
+        self, belief: Gaussian, dt: float, follower: FollowerMotion, measurement: Measurement, gate: float
     ) -> Stepped:
         """Belief after dt [s] and a measurement at the end of it, and the NIS of this measurement.
 

@@ -15,8 +15,9 @@ import numpy as np
 
 from estimation.filters.belief import Belief, Model, Modes, innovation
 from estimation.filters.estimator import Estimator
+from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import Measurement
-from estimation.models.motion import FollowerMotion, Matrix
+from estimation.models.motion import Matrix
 
 TURN_BANDWIDTHS = (0.03, 0.5)
 """Turn-rate bandwidth of a gentle and of an agile leader: q_u = bandwidth * k_u^2 per second."""
@@ -42,7 +43,7 @@ class InteractingModels(Estimator):
         self.sojourn = sojourn
         k_u = model.limits.k_u
         self._filters = [
-            make_filter(replace(model, noise=replace(model.noise, q_u=bandwidth * k_u**2)))
+            make_filter(replace(model, noise=model.noise._replace(q_u=bandwidth * k_u**2)))
             for bandwidth in bandwidths
         ]
 

@@ -7,8 +7,9 @@ from filterpy.kalman import ExtendedKalmanFilter, MerweScaledSigmaPoints, Unscen
 
 from estimation.filters.belief import Belief, Model
 from estimation.filters.estimator import Estimator
+from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import Measurement
-from estimation.models.motion import STATE_SIZE, FollowerMotion, Matrix, Vector
+from estimation.models.motion import STATE_SIZE, Matrix, Vector
 
 _POSITION = np.eye(2, STATE_SIZE)
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from estimation.models.motion import FollowerMotion, Matrix, Vector
+from estimation.models.coordinated_turn import FollowerMotion
+from estimation.models.motion import Matrix, Vector
 from formation.pose import Pose
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Guess:
     """What a first guess of the leader's velocity is made of: an earlier position, and how it has aged.
 
@@ -24,7 +25,7 @@ class Guess:
     samples: int = 1
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ShapeState:
     """State (5,) ``[rho, alpha1, alpha2, v1, u1]`` with its covariance (5, 5), SI units and radians.
 
@@ -39,7 +40,7 @@ class ShapeState:
     heading_noise: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Stage:
     """One moment of a window: how long after the one before [s], and how the follower moved in between.
 
@@ -55,7 +56,7 @@ class Stage:
     noise: Matrix | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Horizon:
     """The window of a moving-horizon estimator: its moments, and what all before says of the first of them.
 
@@ -102,7 +103,7 @@ class Excitation:
         return math.sqrt(max(0.0, 1.0 - abs(self.own) ** 2 / (self.weight * self.own_squared)))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class SensorOffsets:
     """Offsets (2,) of a sensor's range [m] and bearing [rad], measured minus true.
 

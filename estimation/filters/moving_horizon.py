@@ -18,8 +18,9 @@ import numpy as np
 from estimation.filters.belief import Belief, Model
 from estimation.filters.estimator import Estimator
 from estimation.filters.memory import Horizon, Stage
+from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import Measurement
-from estimation.models.motion import STATE_SIZE, FollowerMotion, Matrix, Vector
+from estimation.models.motion import STATE_SIZE, Matrix, Vector
 
 _AT_ONCE = FollowerMotion(0.0, 0.0, 0.0, 0.0)
 _NO_DRIVE = np.zeros((STATE_SIZE, STATE_SIZE))

@@ -12,8 +12,9 @@ from estimation.filters.estimator import Estimator
 from estimation.filters.memory import Guess, ShapeState
 from estimation.filters.shape_motion import cartesian, drive_through, range_and_bearing
 from estimation.models import motion
+from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import FrontEnd, Measurement
-from estimation.models.motion import FollowerMotion, Matrix, Vector
+from estimation.models.motion import Matrix, Vector
 from formation.angles import wrap
 from formation.pose import Pose, advance
 

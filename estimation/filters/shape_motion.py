@@ -11,8 +11,9 @@ import math
 import numpy as np
 
 from estimation.filters.belief import Model
+from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import Measurement
-from estimation.models.motion import FollowerMotion, Matrix, Vector
+from estimation.models.motion import Matrix, Vector
 from formation.angles import wrap
 from formation.pose import Motion
 from formation.shape import Shape, shape_rates

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from estimation.filters.belief import Belief
 from estimation.filters.ekf import driven, mean_of
+from estimation.filters.gaussian import Gaussian
 from estimation.models.coordinated_turn import ProcessNoise, State, moved
 from formation.arc import swing
 from formation.kernel import kernel
@@ -94,7 +94,7 @@ def _with_pair(sums: Sums, mean: State, column: State, centre: State, dt: float)
 
 
 @kernel(inline=False)
-def unscented_moved(b: Belief, dt: float, noise: ProcessNoise) -> Belief:
+def unscented_moved(b: Gaussian, dt: float, noise: ProcessNoise) -> Gaussian:
     """Carry a belief through dt [s] in a fixed frame by its points."""
     mean = mean_of(b)
     centre = moved(mean, swing(mean.u, dt))
@@ -123,10 +123,10 @@ def unscented_moved(b: Belief, dt: float, noise: ProcessNoise) -> Belief:
 
 
 @kernel
-def _moments(b: Belief, sums: Sums, centre: State) -> Belief:
+def _moments(b: Gaussian, sums: Sums, centre: State) -> Gaussian:
     """Belief of ten points' mean and covariance; the mean of their turn rates is the centre's."""
     x, y, vx, vy = 0.1 * sums.x, 0.1 * sums.y, 0.1 * sums.vx, 0.1 * sums.vy
-    return Belief(
+    return Gaussian(
         centre.x + x,
         centre.y + y,
         centre.vx + vx,

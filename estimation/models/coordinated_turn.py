@@ -122,9 +122,7 @@ def acceleration(vx: float, vy: float, noise: ProcessNoise) -> Spread:
     squared, floor = vx * vx + vy * vy, noise.v_eps * noise.v_eps
     weight = noise.q_v / (squared + floor)
     start = noise.q_start * max(0.0, 1.0 - squared / floor)
-    return Spread(
-        weight * (vx * vx + floor) + start, weight * vx * vy, weight * (vy * vy + floor) + start
-    )
+    return Spread(weight * (vx * vx + floor) + start, weight * vx * vy, weight * (vy * vy + floor) + start)
 
 
 @kernel

@@ -40,9 +40,6 @@ class PairSeen(NamedTuple):
     follower: Pose
 
 
-NOBODY_SEEN = PairSeen(0.0, 0.0, Pose(0.0, 0.0, 0.0))
-
-
 class Measurement(NamedTuple):
     """The leader's position at one capture time, and what belongs to that moment.
 
@@ -62,6 +59,13 @@ class Measurement(NamedTuple):
     framed: bool
     seen: PairSeen
     noise: PoseNoise
+
+    @staticmethod
+    def at(capture_ns: int, position: Vector, covariance: Matrix, motion: FollowerMotion) -> Measurement:
+        """Sighting of a position (2,) [m] with its covariance (2, 2) [m^2], along the follower's axes."""
+        (x, y), ((xx, xy), (_, yy)) = position.tolist(), covariance.tolist()
+        noise, seen = PoseNoise(0.0, 0.0), PairSeen(0.0, 0.0, Pose(0.0, 0.0, 0.0))
+        return Measurement(capture_ns, x, y, Spread(xx, xy, yy), motion, False, False, seen, noise)
 
     @property
     def position(self) -> Vector:
@@ -87,21 +91,21 @@ class Measurement(NamedTuple):
 
 @kernel
 def measure_world(
-    capture_ns: int, seen: PairSeen, noise: PoseNoise, motion: FollowerMotion
+    capture_ns: int, leader: tuple[float, float], follower: Pose, noise: PoseNoise, motion: FollowerMotion
 ) -> Measurement:
     """World front end: the leader's mocap position, with covariance sigma_p^2 I."""
     variance = noise.position * noise.position
-    spread = Spread(variance, 0.0, variance)
-    return Measurement(capture_ns, seen.leader_x, seen.leader_y, spread, motion, True, True, seen, noise)
+    spread, seen = Spread(variance, 0.0, variance), PairSeen(leader[0], leader[1], follower)
+    return Measurement(capture_ns, leader[0], leader[1], spread, motion, True, True, seen, noise)
 
 
 @kernel
-def from_sensor(rho: float, alpha2: float, sensor_x: float, sensor_y: float) -> tuple[float, float]:
+def from_sensor(rho: float, alpha2: float, place: tuple[float, float]) -> tuple[float, float]:
     """Range [m] and bearing [rad] from the follower's wheel axis, out of those from a sensor's place.
 
-    sensor_x, sensor_y: [m] ahead of the axis' middle and to the left of it; the axes are the follower's.
+    place: [m] ahead of the axis' middle and to the left of it; the sensor's axes are the follower's.
     """
-    x, y = sensor_x + rho * math.cos(alpha2), sensor_y + rho * math.sin(alpha2)
+    x, y = place[0] + rho * math.cos(alpha2), place[1] + rho * math.sin(alpha2)
     return math.sqrt(x * x + y * y), math.atan2(y, x)
 
 
@@ -131,14 +135,13 @@ def measure_body(
 
 @kernel
 def measure_body_from_mocap(
-    capture_ns: int, seen: PairSeen, noise: PoseNoise, motion: FollowerMotion
+    capture_ns: int, leader: tuple[float, float], follower: Pose, noise: PoseNoise, motion: FollowerMotion
 ) -> Measurement:
-    """Body front end fed by mocap.
+    """Body front end fed by mocap; the robots must not be in one place.
 
     var(rho) = 2 sigma_p^2, var(alpha2) = 2 sigma_p^2 / rho^2 + sigma_heading^2.
     """
-    follower = seen.follower
-    dx, dy = seen.leader_x - follower.x, seen.leader_y - follower.y
+    dx, dy = leader[0] - follower.x, leader[1] - follower.y
     cos, sin = math.cos(follower.theta), math.sin(follower.theta)
     x, y = cos * dx + sin * dy, cos * dy - sin * dx
     squared = x * x + y * y
@@ -146,4 +149,5 @@ def measure_body_from_mocap(
     along = 2.0 * noise.position * noise.position
     across = along + squared * noise.heading * noise.heading
     spread = spread_of_sight(x / rho, y / rho, along, across)
+    seen = PairSeen(leader[0], leader[1], follower)
     return Measurement(capture_ns, x, y, spread, motion, False, True, seen, noise)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.own_motion.input_alignment import UNKNOWN, Alignment, Known, align_odometry
-from estimation.own_motion.inputs import MotionSample
+from estimation.own_motion.odometry_history import IDEAL, Correction, MotionSample
 from formation.pose import Pose
 
 SPAN_NS = 30_000_000_000
@@ -24,18 +24,6 @@ _THINNED_NS = 30_000_000  # between two poses or samples that are kept
 _SURE = 4.0  # standard deviations off the ideal, before a correction begins
 _LEAST_DELAY = 0.02  # [s]; below this nothing is worth correcting
 _LEAST_SCALE = 0.02
-
-
-@dataclass(frozen=True, slots=True)
-class Correction:
-    """``motion(t) = scale * odometry(t - delay)`` as it is applied; delay in [s]."""
-
-    delay: float = 0.0
-    scale_v: float = 1.0
-    scale_u: float = 1.0
-
-
-IDEAL = Correction()
 
 
 @dataclass(frozen=True, slots=True)

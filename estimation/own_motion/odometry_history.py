@@ -21,6 +21,10 @@ class MotionSample(NamedTuple):
     u2: float
 
 
+History = tuple[MotionSample, ...]
+"""Samples in the order of their stamps, as plain Python hands them on."""
+
+
 class InputTrust(NamedTuple):
     """What is known of the follower's motion signal.
 
@@ -44,6 +48,9 @@ class Correction(NamedTuple):
     delay: float = 0.0
     scale_v: float = 1.0
     scale_u: float = 1.0
+
+
+IDEAL = Correction()
 
 
 @kernel
@@ -79,7 +86,7 @@ def remember(history: Rows[MotionSample], ring: Ring, sample: MotionSample, span
         store(history, place(ring, history, at), sample_at(history, ring, at - 1))
     store(history, place(ring, history, k), sample)
     ring = Ring(ring.first, ring.length + 1)
-    oldest_ns = sample_at(history, ring, ring.length - 1).stamp_ns - int(math.floor(span / _NS + 0.5))
+    oldest_ns = sample_at(history, ring, ring.length - 1).stamp_ns - math.floor(span / _NS + 0.5)
     while sample_at(history, ring, 0).stamp_ns < oldest_ns:
         ring = Ring(place(ring, history, 1), ring.length - 1)
     return ring
@@ -117,7 +124,7 @@ def follower_motion(
     now = motion_at(history, ring, now_ns)
     sd_v2, sd_u2 = trust.sd_v2, trust.sd_u2
     if trust.lag > 0.0:
-        since_ns = now_ns - int(math.floor(trust.lag / _NS + 0.5))
+        since_ns = now_ns - math.floor(trust.lag / _NS + 0.5)
         past = motion_at(history, ring, since_ns)
         change_v, change_u = abs(past.v2 - now.v2), abs(past.u2 - now.u2)
         k = sample_place(history, ring, now_ns) - 1
@@ -125,11 +132,14 @@ def follower_motion(
             past = sample_at(history, ring, k)
             change_v, change_u = max(change_v, abs(past.v2 - now.v2)), max(change_u, abs(past.u2 - now.u2))
             k -= 1
-        sd_v2, sd_u2 = math.sqrt(sd_v2 * sd_v2 + change_v * change_v), math.sqrt(sd_u2 * sd_u2 + change_u * change_u)
+        sd_v2, sd_u2 = (
+            math.sqrt(sd_v2 * sd_v2 + change_v * change_v),
+            math.sqrt(sd_u2 * sd_u2 + change_u * change_u),
+        )
     return FollowerMotion(correction.scale_v * now.v2, correction.scale_u * now.u2, sd_v2, sd_u2)
 
 
 @kernel
 def delay_ns(trust: InputTrust, correction: Correction) -> int:
     """By how much the motion comes after its signal [ns]."""
-    return int(math.floor((trust.delay + correction.delay) / _NS + 0.5))
+    return math.floor((trust.delay + correction.delay) / _NS + 0.5)

@@ -112,9 +112,7 @@ def motion_of(point: OwnPoint) -> FollowerMotion:
 
 
 @kernel
-def own_begun(
-    capture_ns: int, pose: Pose, told: bool, odometry: FollowerMotion, noise: OwnNoise
-) -> OwnPoint:
+def own_begun(capture_ns: int, pose: Pose, told: bool, odometry: FollowerMotion, noise: OwnNoise) -> OwnPoint:
     """Point of one who knows the pose only: at rest, give or take the limits."""
     place, heading = noise.pose.position * noise.pose.position, noise.pose.heading * noise.pose.heading
     speed, turn = noise.v_max * noise.v_max, noise.u_max * noise.u_max
@@ -204,9 +202,13 @@ def _spread_moved(state: OwnState, p: OwnSpread, dt: float, noise: OwnNoise) -> 
 def _with_pose(state: OwnState, p: OwnSpread, pose: Pose, noise: PoseNoise) -> Updated:
     """After a pose, component by component: with independent noise that is the joint update."""
     place, heading = noise.position * noise.position, noise.heading * noise.heading
-    first = _measured(Updated(state, p, 0.0), OwnState(p.x_x, p.x_y, p.x_t, p.x_v, p.x_u), p.x_x + place, pose.x - state.x)
+    first = _measured(
+        Updated(state, p, 0.0), OwnState(p.x_x, p.x_y, p.x_t, p.x_v, p.x_u), p.x_x + place, pose.x - state.x
+    )
     q = first.spread
-    second = _measured(first, OwnState(q.x_y, q.y_y, q.y_t, q.y_v, q.y_u), q.y_y + place, pose.y - first.state.y)
+    second = _measured(
+        first, OwnState(q.x_y, q.y_y, q.y_t, q.y_v, q.y_u), q.y_y + place, pose.y - first.state.y
+    )
     r = second.spread
     turned = wrapped(pose.theta - second.state.theta)
     third = _measured(second, OwnState(r.x_t, r.y_t, r.t_t, r.t_v, r.t_u), r.t_t + heading, turned)
@@ -217,9 +219,13 @@ def _with_pose(state: OwnState, p: OwnSpread, pose: Pose, noise: PoseNoise) -> U
 def _with_motion(state: OwnState, p: OwnSpread, told: FollowerMotion, thinned: float) -> Updated:
     """After odometry whose samples tell less than their number, by a factor on their variance."""
     speed, turn = thinned * told.sd_v2 * told.sd_v2, thinned * told.sd_u2 * told.sd_u2
-    first = _measured(Updated(state, p, 0.0), OwnState(p.x_v, p.y_v, p.t_v, p.v_v, p.v_u), p.v_v + speed, told.v2 - state.v)
+    first = _measured(
+        Updated(state, p, 0.0), OwnState(p.x_v, p.y_v, p.t_v, p.v_v, p.v_u), p.v_v + speed, told.v2 - state.v
+    )
     q = first.spread
-    return _measured(first, OwnState(q.x_u, q.y_u, q.t_u, q.v_u, q.u_u), q.u_u + turn, told.u2 - first.state.u)
+    return _measured(
+        first, OwnState(q.x_u, q.y_u, q.t_u, q.v_u, q.u_u), q.u_u + turn, told.u2 - first.state.u
+    )
 
 
 @kernel
@@ -316,7 +322,7 @@ def folded(track: Rows[OwnPoint], ring: Ring, due: OwnPoint, noise: OwnNoise, sp
         store(track, place(ring, track, at), point)
         due = later
     ring = Ring(ring.first, n + 1)
-    oldest_ns = own_point(track, ring, n).capture_ns - int(math.floor(span / _NS + 0.5))
+    oldest_ns = own_point(track, ring, n).capture_ns - math.floor(span / _NS + 0.5)
     while ring.length > 1 and own_point(track, ring, 1).capture_ns < oldest_ns:
         ring = Ring(place(ring, track, 1), ring.length - 1)
     return ring

@@ -7,16 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimation.filters.belief import Belief
 from estimation.filters.ekf import spread_by, turned
+from estimation.filters.gaussian import Gaussian
 from estimation.models.coordinated_turn import FollowerMotion, Push
 from estimation.models.measurement import Measurement
 from estimation.models.motion import Matrix
 from estimation.tracking.track_point import JumpUncertainty, TrackPoint
-from estimation.tracking.tracker import Status
 from formation.angles import wrapped
 from formation.kernel import kernel
-from formation.pose import Pose
 
 QUANTITIES = ("rho_dot", "alpha2_dot", "v1", "alpha1", "u1")
 _LEAST = 1e-9  # of a distance [m] or speed [m/s] that is divided by
@@ -24,7 +22,7 @@ _ROWS, _COLUMNS = np.triu_indices(len(QUANTITIES))
 
 
 class Joint(NamedTuple):
-    """Upper triangle, by rows, of the covariance of rho_dot (r), alpha2_dot (a), v1 (v), alpha1 (b), u1 (u)."""
+    """Upper triangle by rows of the covariance of rho_dot (r), alpha2_dot (a), v1 (v), alpha1 (b), u1 (u)."""
 
     r_r: float
     r_a: float
@@ -49,7 +47,7 @@ class Estimate(NamedTuple):
     rho [m], alpha2 [rad]; rho_dot [m/s], alpha2_dot [rad/s]; the leader's v1 [m/s], alpha1 [rad] and
     u1 [rad/s]; the follower's v2 [m/s], u2 [rad/s] it rests on.
     joint: covariance of :data:`QUANTITIES`. nis: of the newest measurement, nan for a first one.
-    measured_ns: capture time of the newest measurement that was used. code: the :class:`Status` as a number.
+    measured_ns: capture time of the newest measurement that was used. status: a :class:`~.tracker.Status`.
     jump: jumps that may be errors of the mocap; they are in the covariance.
     """
 
@@ -66,13 +64,8 @@ class Estimate(NamedTuple):
     u2: float
     joint: Joint
     nis: float
-    code: int
+    status: int
     jump: JumpUncertainty
-
-    @property
-    def status(self) -> Status:
-        """How far it can be trusted."""
-        return Status(self.code)
 
     @property
     def covariance(self) -> Matrix:
@@ -107,27 +100,33 @@ class Sight(NamedTuple):
 
 
 @kernel
-def estimate_at(point: TrackPoint, code: int) -> Estimate:
+def estimate_at(point: TrackPoint, status: int) -> Estimate:
     """Estimate at a point of a track, its status being given.
 
     A follower's pose that was not believed gives way to the one that its own motion led to.
     """
     measurement = point.measurement
-    pose = point.check.pose if point.check.known else measurement.seen.follower
-    return estimate_of(point.belief, measurement, pose, point.jump)._replace(
-        measured_ns=point.used_ns, nis=point.nis, code=code
-    )
+    if point.check.known:
+        measurement = measurement._replace(seen=measurement.seen._replace(follower=point.check.pose))
+    return estimate_of(point.belief, measurement, status, point.nis, point.used_ns, point.jump)
 
 
 @kernel
-def estimate_of(belief: Belief, measurement: Measurement, pose: Pose, jump: JumpUncertainty) -> Estimate:
-    """Estimate at a measurement's capture time from the belief at that time, the follower being at a pose.
+def estimate_of(
+    belief: Gaussian,
+    measurement: Measurement,
+    status: int,
+    nis: float,
+    measured_ns: int,
+    jump: JumpUncertainty,
+) -> Estimate:
+    """Estimate at a measurement's capture time from the belief at that time.
 
     With e the unit vector to the leader, n its left normal, x the follower's heading and w the leader's
     velocity: rho_dot = e (w - v2 x), alpha2_dot = n (w - v2 x) / rho - u2, v1 = |w|, alpha1 the angle from
     w to -e. Inserted into Eq. (7) these give v1 and alpha1 again, whatever v2 and u2 are.
     """
-    b, own = along_own_axes(belief, measurement, pose, jump), measurement.motion
+    b, own = along_own_axes(belief, measurement, jump), measurement.motion
     rho, v1 = math.sqrt(b.x * b.x + b.y * b.y), math.sqrt(b.vx * b.vx + b.vy * b.vy)
     ex, ey = 1.0, 0.0
     if rho > 0.0:
@@ -137,7 +136,7 @@ def estimate_of(belief: Belief, measurement: Measurement, pose: Pose, jump: Jump
     sight = Sight(ex, ey, safe, ex * ahead + ey * b.vy, ex * b.vy - ey * ahead)
     return Estimate(
         measurement.capture_ns,
-        measurement.capture_ns,
+        measured_ns,
         rho,
         math.atan2(b.y, b.x),
         sight.along,
@@ -148,35 +147,36 @@ def estimate_of(belief: Belief, measurement: Measurement, pose: Pose, jump: Jump
         own.v2,
         own.u2,
         joint_covariance(b, sight, own),
-        math.nan,
-        0,
+        nis,
+        status,
         jump,
     )
 
 
 @kernel
-def along_own_axes(belief: Belief, measurement: Measurement, pose: Pose, jump: JumpUncertainty) -> Belief:
+def along_own_axes(belief: Gaussian, measurement: Measurement, jump: JumpUncertainty) -> Gaussian:
     """Belief along the follower's axes; a mocap pose brings its own noise into it, a jump what it may be.
 
     Noise and jump act alike: on the leader's place in every direction, and by the own heading on everything.
     """
     b = belief
     if measurement.in_world:
-        c, s, noise = math.cos(pose.theta), math.sin(pose.theta), measurement.noise
+        pose, noise = measurement.seen.follower, measurement.noise
+        c, s = math.cos(pose.theta), math.sin(pose.theta)
         b = turned(b._replace(x=b.x - pose.x, y=b.y - pose.y), c, s)
         b = _blurred(b, noise.position * noise.position, noise.heading * noise.heading)
     return _blurred(b, jump.position * jump.position, jump.heading * jump.heading)
 
 
 @kernel
-def _blurred(b: Belief, place: float, heading: float) -> Belief:
+def _blurred(b: Gaussian, place: float, heading: float) -> Gaussian:
     """Belief with variances of the follower's place [m^2] and heading [rad^2] in it."""
     b = spread_by(b, heading, Push(b.y, -b.x, b.vy, -b.vx))
     return b._replace(x_x=b.x_x + place, y_y=b.y_y + place)
 
 
 @kernel
-def _slopes(b: Belief, sight: Sight) -> tuple[Slope, Slope, Slope, Slope]:
+def _slopes(b: Gaussian, sight: Sight) -> tuple[Slope, Slope, Slope, Slope]:
     """Derivatives of rho_dot, alpha2_dot, v1 and alpha1."""
     ex, ey, rho = sight.ex, sight.ey, sight.rho
     nx, ny = -ey, ex
@@ -197,7 +197,7 @@ def _slopes(b: Belief, sight: Sight) -> tuple[Slope, Slope, Slope, Slope]:
 
 
 @kernel
-def _by(b: Belief, g: Slope) -> Slope:
+def _by(b: Gaussian, g: Slope) -> Slope:
     """Covariance of a quantity of this slope with position and velocity."""
     return Slope(
         g.x * b.x_x + g.y * b.x_y + g.vx * b.x_vx + g.vy * b.x_vy,
@@ -208,7 +208,7 @@ def _by(b: Belief, g: Slope) -> Slope:
 
 
 @kernel
-def _with_turn(b: Belief, g: Slope) -> float:
+def _with_turn(b: Gaussian, g: Slope) -> float:
     """Covariance of a quantity of this slope with the leader's turn rate."""
     return g.x * b.x_u + g.y * b.y_u + g.vx * b.vx_u + g.vy * b.vy_u
 
@@ -219,7 +219,7 @@ def _dot(a: Slope, b: Slope) -> float:
 
 
 @kernel
-def joint_covariance(b: Belief, sight: Sight, own: FollowerMotion) -> Joint:
+def joint_covariance(b: Gaussian, sight: Sight, own: FollowerMotion) -> Joint:
     """Covariance of :data:`QUANTITIES` of a belief along the follower's axes, the errors of v2, u2 in it."""
     r, a, v, w = _slopes(b, sight)
     by_r, by_a, by_v, by_w = _by(b, r), _by(b, a), _by(b, v), _by(b, w)

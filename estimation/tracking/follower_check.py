@@ -160,9 +160,9 @@ def _cause(check: FollowerCheck, seen: PairSeen, noise: PoseNoise, gate: float, 
         return BELIEVED
     if position_misfit(check, seen.leader_x, seen.leader_y, noise) <= gate:
         return SWAPPED
-    if position_misfit(check, seen.follower.x, seen.follower.y, noise) <= gate:
-        if heading_misfit(check, seen.follower.theta + math.pi, noise) <= gate:
-            return FLIPPED
+    in_place = position_misfit(check, seen.follower.x, seen.follower.y, noise) <= gate
+    if in_place and heading_misfit(check, seen.follower.theta + math.pi, noise) <= gate:
+        return FLIPPED
     return FOLLOWER
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from estimation.filters.belief import Belief
 from estimation.filters.filter import Filter
+from estimation.filters.gaussian import Gaussian
 from estimation.models.coordinated_turn import mean_motion
 from estimation.models.measurement import Measurement
 from estimation.tracking.follower_check import FollowerCheck, carried, check_from, misfit
@@ -17,7 +17,9 @@ _NS = 1e-9
 
 
 @kernel(inline=False)
-def joined(tentative: TentativeTrack, measurement: Measurement, filter: Filter, gate: float) -> TentativeTrack:
+def joined(
+    tentative: TentativeTrack, measurement: Measurement, estimator: Filter, gate: float
+) -> TentativeTrack:
     """Tentative track that a rejected measurement has joined, or a new one if the two do not agree.
 
     They agree if leader and follower are within the gate of where the tentative track has them.
@@ -26,12 +28,12 @@ def joined(tentative: TentativeTrack, measurement: Measurement, filter: Filter, 
     if tentative.frames > 0:
         dt = (capture_ns - tentative.capture_ns) * _NS
         own = mean_motion(tentative.motion, motion)
-        stepped = filter.step(tentative.belief, dt, own, measurement, gate)
+        stepped = estimator.step(tentative.belief, dt, own, measurement, gate)
         if stepped.nis <= gate and _follower_fits(tentative, measurement, dt, gate):
             return TentativeTrack(
                 stepped.belief, capture_ns, motion, tentative.frames + 1, measurement.framed, follower
             )
-    return TentativeTrack(filter.start(measurement), capture_ns, motion, 1, measurement.framed, follower)
+    return TentativeTrack(estimator.start(measurement), capture_ns, motion, 1, measurement.framed, follower)
 
 
 @kernel
@@ -45,7 +47,7 @@ def _follower_fits(tentative: TentativeTrack, measurement: Measurement, dt: floa
 
 @kernel
 def jumped(
-    jump: JumpUncertainty, measurement: Measurement, prior: Belief, check: FollowerCheck, leader_fits: bool
+    jump: JumpUncertainty, measurement: Measurement, prior: Gaussian, check: FollowerCheck, leader_fits: bool
 ) -> JumpUncertainty:
     """Uncertainty with the jump added that leads from what was predicted to a measurement.
 

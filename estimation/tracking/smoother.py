@@ -7,15 +7,15 @@ For reference tracks out of a log; of no use to a follower that has to act now.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 
-from estimation.filters.belief import Belief
+from estimation.filters.gaussian import Gaussian
+from estimation.models.coordinated_turn import mean_motion
 from estimation.models.measurement import Measurement
 from estimation.models.motion import STATE_SIZE
-from estimation.own_motion.inputs import mean_motion
-from estimation.tracking.tracker import Tracker, TrackPoint, Verdict
+from estimation.tracking.track import Tracker
+from estimation.tracking.track_point import TrackPoint, Verdict, no_tentative
 
 _NS = 1e-9
 
@@ -31,13 +31,14 @@ def smooth(tracker: Tracker, measurements: Iterable[Measurement]) -> tuple[Track
     forward = _forward(tracker, measurements)
     backward: list[TrackPoint] = []
     for point in reversed(forward):
-        if backward and backward[-1].verdict is not Verdict.RESTARTED:
-            point = replace(point, belief=_carried_back(tracker, point, backward[-1]))
+        if backward and backward[-1].verdict != Verdict.RESTARTED:
+            point = point._replace(belief=_carried_back(tracker, point, backward[-1]))
         backward.append(point)
     smoothed: list[TrackPoint] = []
     for point in reversed(backward):
-        before = bool(smoothed) and smoothed[-1].settled and point.verdict is not Verdict.RESTARTED
-        smoothed.append(replace(point, settled=tracker.settled(point.belief, before), candidate=None))
+        before = bool(smoothed) and smoothed[-1].settled and point.verdict != Verdict.RESTARTED
+        settled = tracker.settled(point.belief, before)
+        smoothed.append(point._replace(settled=settled, tentative=no_tentative(point.belief)))
     return tuple(smoothed)
 
 
@@ -50,7 +51,7 @@ def _forward(tracker: Tracker, measurements: Iterable[Measurement]) -> list[Trac
     return points
 
 
-def _carried_back(tracker: Tracker, here: TrackPoint, later: TrackPoint) -> Belief:
+def _carried_back(tracker: Tracker, here: TrackPoint, later: TrackPoint) -> Gaussian:
     """Belief at a point from its filtered one and the smoothed one of the next.
 
     With G = P F^T (F P F^T + Q)^-1 the covariance is (I - G F) P (I - G F)^T + G (Q + P_later) G^T: the
@@ -66,4 +67,4 @@ def _carried_back(tracker: Tracker, here: TrackPoint, later: TrackPoint) -> Beli
     change = later.belief.mean - model.propagate(filtered.mean, dt, follower)
     rest = np.eye(STATE_SIZE) - gain @ move
     covariance = rest @ filtered.covariance @ rest.T + gain @ (noise + later.belief.covariance) @ gain.T
-    return Belief(filtered.mean + gain @ change, 0.5 * (covariance + covariance.T))
+    return Gaussian.of(filtered.mean + gain @ change, 0.5 * (covariance + covariance.T))

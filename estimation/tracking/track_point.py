@@ -6,8 +6,8 @@ import math
 from enum import IntEnum
 from typing import NamedTuple
 
-from estimation.filters.belief import Belief
 from estimation.filters.filter import Filter
+from estimation.filters.gaussian import Gaussian
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import Measurement
 from estimation.tracking.follower_check import BELIEVED, FollowerCheck, check_from
@@ -60,7 +60,7 @@ class TentativeTrack(NamedTuple):
     the follower's pose in it.
     """
 
-    belief: Belief
+    belief: Gaussian
     capture_ns: int
     motion: FollowerMotion
     frames: int
@@ -76,7 +76,7 @@ class TrackPoint(NamedTuple):
     """
 
     measurement: Measurement
-    belief: Belief
+    belief: Gaussian
     verdict: int
     nis: float
     used_ns: int
@@ -88,15 +88,15 @@ class TrackPoint(NamedTuple):
 
 
 @kernel
-def no_tentative(belief: Belief) -> TentativeTrack:
+def no_tentative(belief: Gaussian) -> TentativeTrack:
     """No tentative track; its fields must hold something, so take the belief."""
     return TentativeTrack(belief, 0, FollowerMotion(0.0, 0.0, 0.0, 0.0), 0, False, Pose(0.0, 0.0, 0.0))
 
 
 @kernel
-def begun(measurement: Measurement, filter: Filter) -> TrackPoint:
+def begun(measurement: Measurement, estimator: Filter) -> TrackPoint:
     """First point of a track that knows nothing but this measurement."""
-    belief = filter.start(measurement)
+    belief = estimator.start(measurement)
     return TrackPoint(
         measurement,
         belief,

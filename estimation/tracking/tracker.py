@@ -11,8 +11,8 @@ import math
 from enum import IntEnum
 from typing import NamedTuple
 
-from estimation.filters.belief import Belief, sd_heading_of, speed_of
 from estimation.filters.filter import Filter
+from estimation.filters.gaussian import Gaussian, sd_heading_of, speed_of
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, mean_motion
 from estimation.models.measurement import Measurement
 from estimation.tracking.follower_check import (
@@ -107,7 +107,7 @@ def gate_of(settings: TrackSettings) -> float:
 
 
 @kernel
-def is_settled(belief: Belief, before: bool, settings: TrackSettings, limits: LeaderLimits) -> bool:
+def is_settled(belief: Gaussian, before: bool, settings: TrackSettings, limits: LeaderLimits) -> bool:
     """Whether the leader's direction is known well enough, for a track that was settled before or not.
 
     The first few measurements may make a leader seem faster than any is, and its direction the better known
@@ -137,7 +137,9 @@ def status_of(point: TrackPoint, now_ns: int, settings: TrackSettings) -> int:
 
 
 @kernel
-def follow(last: TrackPoint, measurement: Measurement, settings: TrackSettings, filter: Filter) -> TrackPoint:
+def follow(
+    last: TrackPoint, measurement: Measurement, settings: TrackSettings, estimator: Filter
+) -> TrackPoint:
     """Fold one measurement, newer than the point, into it.
 
     It is used if the leader passes the gate and the frame its checks. If not, it joins the tentative track,
@@ -145,21 +147,21 @@ def follow(last: TrackPoint, measurement: Measurement, settings: TrackSettings, 
     that no robot does, and it has time until the track is lost.
     """
     capture_ns, full_gate = measurement.capture_ns, gate_of(settings)
-    found = _checked(last, measurement, full_gate, filter)
+    found = _checked(last, measurement, full_gate, estimator)
     if (capture_ns - last.used_ns) * _NS > settings.lost_after:
-        return _found(last, measurement, found, settings, filter)
+        return _found(last, measurement, found, settings, estimator)
     # Nothing passes a negative gate: the belief is then the prediction.
     gate = full_gate if found.cause == BELIEVED else -1.0
     dt = (capture_ns - last.measurement.capture_ns) * _NS
     motion = mean_motion(last.measurement.motion, measurement.motion)
-    stepped = filter.step(last.belief, dt, motion, measurement, gate)
+    stepped = estimator.step(last.belief, dt, motion, measurement, gate)
     point = TrackPoint(
         measurement,
         stepped.belief,
         USED,
         stepped.nis,
         capture_ns,
-        is_settled(stepped.belief, last.settled, settings, filter.limits),
+        is_settled(stepped.belief, last.settled, settings, estimator.limits),
         no_tentative(stepped.belief),
         found.check,
         BELIEVED,
@@ -171,12 +173,12 @@ def follow(last: TrackPoint, measurement: Measurement, settings: TrackSettings, 
     rejected = point._replace(verdict=GATED, used_ns=last.used_ns, cause=cause)
     if cause == FROZEN:
         return rejected
-    tentative = joined(last.tentative, measurement, filter, full_gate)
-    return _taken_over(rejected._replace(tentative=tentative), settings, filter)
+    tentative = joined(last.tentative, measurement, estimator, full_gate)
+    return _taken_over(rejected._replace(tentative=tentative), settings, estimator)
 
 
 @kernel
-def _checked(last: TrackPoint, measurement: Measurement, gate: float, filter: Filter) -> Checked:
+def _checked(last: TrackPoint, measurement: Measurement, gate: float, estimator: Filter) -> Checked:
     """Check at the measurement, and what there is against its frame; nothing against a sighting."""
     check: FollowerCheck = last.check
     if check.known:
@@ -186,13 +188,13 @@ def _checked(last: TrackPoint, measurement: Measurement, gate: float, filter: Fi
         return Checked(check, BELIEVED)
     if not check.known:
         return Checked(check_from(measurement), BELIEVED)
-    leader_moves = speed_of(last.belief) >= 0.5 * filter.limits.v_eps
+    leader_moves = speed_of(last.belief) >= 0.5 * estimator.limits.v_eps
     return checked(check, measurement.seen, measurement.noise, gate, leader_moves)
 
 
 @kernel(inline=False)
 def _found(
-    last: TrackPoint, measurement: Measurement, found: Checked, settings: TrackSettings, filter: Filter
+    last: TrackPoint, measurement: Measurement, found: Checked, settings: TrackSettings, estimator: Filter
 ) -> TrackPoint:
     """Start anew after a loss: with the tentative track if it is ripe, unless the frame is plainly wrong.
 
@@ -209,16 +211,16 @@ def _found(
             check=found.check,
             cause=found.cause,
         )
-    anew = begun(measurement, filter)
-    tentative = joined(last.tentative, measurement, filter, gate_of(settings))
+    anew = begun(measurement, estimator)
+    tentative = joined(last.tentative, measurement, estimator, gate_of(settings))
     if tentative.frames < settings.reacquire_frames:
         return anew._replace(tentative=tentative)
-    settled = is_settled(tentative.belief, False, settings, filter.limits)
+    settled = is_settled(tentative.belief, False, settings, estimator.limits)
     return anew._replace(belief=tentative.belief, settled=settled)
 
 
 @kernel
-def _taken_over(rejected: TrackPoint, settings: TrackSettings, filter: Filter) -> TrackPoint:
+def _taken_over(rejected: TrackPoint, settings: TrackSettings, estimator: Filter) -> TrackPoint:
     """Point of a tentative track that takes over, uncertain by its jump; the rejected one otherwise.
 
     It does not while it is not ripe, nor by a jump that would turn the line between the robots, and with it
@@ -231,13 +233,13 @@ def _taken_over(rejected: TrackPoint, settings: TrackSettings, filter: Filter) -
     jump = jumped(rejected.jump, measurement, prior, rejected.check, leader_fits)
     if line_turn(jump, measurement) > settings.followed_turn:
         return rejected
-    belief = filter.update(prior, measurement) if leader_fits else tentative.belief
+    belief = estimator.update(prior, measurement) if leader_fits else tentative.belief
     check = check_from(measurement) if measurement.framed else rejected.check
     return rejected._replace(
         belief=belief,
         verdict=RESTARTED,
         used_ns=measurement.capture_ns,
-        settled=is_settled(belief, leader_fits and rejected.settled, settings, filter.limits),
+        settled=is_settled(belief, leader_fits and rejected.settled, settings, estimator.limits),
         tentative=no_tentative(belief),
         check=check,
         cause=BELIEVED,
@@ -285,7 +287,7 @@ def place_of(points: Rows[TrackPoint], ring: Ring, capture_ns: int) -> int:
 
 @kernel
 def add(
-    points: Rows[TrackPoint], ring: Ring, measurement: Measurement, settings: TrackSettings, filter: Filter
+    points: Rows[TrackPoint], ring: Ring, measurement: Measurement, settings: TrackSettings, estimator: Filter
 ) -> Added:
     """Fold a measurement in at its place in time; tell what became of it.
 
@@ -295,8 +297,8 @@ def add(
     """
     n = ring.length
     if n == 0 or measurement.capture_ns <= capture_at(points, ring, n - 1):
-        return _inserted(points, ring, measurement, settings, filter)
-    point = follow(point_at(points, ring, n - 1), measurement, settings, filter)
+        return _inserted(points, ring, measurement, settings, estimator)
+    point = follow(point_at(points, ring, n - 1), measurement, settings, estimator)
     if n == size(points):
         ring, n = Ring(place(ring, points, 1), n - 1), n - 1
     store(points, place(ring, points, n), point)
@@ -305,12 +307,12 @@ def add(
 
 @kernel(inline=False)
 def _inserted(
-    points: Rows[TrackPoint], ring: Ring, measurement: Measurement, settings: TrackSettings, filter: Filter
+    points: Rows[TrackPoint], ring: Ring, measurement: Measurement, settings: TrackSettings, estimator: Filter
 ) -> Added:
     """Fold in a measurement that is the first, or not the newest."""
     n, capture_ns = ring.length, measurement.capture_ns
     if n == 0:
-        store(points, place(ring, points, 0), begun(measurement, filter))
+        store(points, place(ring, points, 0), begun(measurement, estimator))
         return Added(Ring(ring.first, 1), RESTARTED, BELIEVED)
     k = place_of(points, ring, capture_ns)
     if capture_at(points, ring, k) == capture_ns:
@@ -324,7 +326,7 @@ def _inserted(
     here = point_at(points, ring, k)
     store(points, place(ring, points, k), here._replace(measurement=measurement))
     ring = Ring(ring.first, n + 1)
-    reprocessed(points, ring, k, settings, filter)
+    reprocessed(points, ring, k, settings, estimator)
     here = point_at(points, ring, k)
     return Added(trimmed(points, ring, settings), here.verdict, here.cause)
 
@@ -332,7 +334,7 @@ def _inserted(
 @kernel
 def window_ns(settings: TrackSettings) -> int:
     """How far back the ring reaches."""
-    return int(math.floor(settings.window / _NS + 0.5))
+    return math.floor(settings.window / _NS + 0.5)
 
 
 @kernel
@@ -349,7 +351,7 @@ def trimmed(points: Rows[TrackPoint], ring: Ring, settings: TrackSettings) -> Ri
 
 @kernel(inline=False)
 def reprocessed(
-    points: Rows[TrackPoint], ring: Ring, k: int, settings: TrackSettings, filter: Filter
+    points: Rows[TrackPoint], ring: Ring, k: int, settings: TrackSettings, estimator: Filter
 ) -> int:
     """Fold the points from the k-th on anew, whose measurements have changed in place; tell how many.
 
@@ -358,7 +360,7 @@ def reprocessed(
     first = max(k, 1)
     point = point_at(points, ring, first - 1)
     for at in range(first, ring.length):
-        point = follow(point, point_at(points, ring, at).measurement, settings, filter)
+        point = follow(point, point_at(points, ring, at).measurement, settings, estimator)
         store(points, place(ring, points, at), point)
     return ring.length - first
 

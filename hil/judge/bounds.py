@@ -21,7 +21,7 @@ _ERRORS = ("M_rho", "M_alpha2", "E_rho", "E_alpha2", "E_v2", "E_u2")
 _NEAREST = 1e-6  # m; nobody is nearer, and bounds divide by the distance
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class WorstErrors:
     """What the bounds rest on, for all samples."""
 

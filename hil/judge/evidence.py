@@ -61,7 +61,7 @@ class LogFacts:
     bytes: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
     """All that :func:`hil.judge.summary.summarise` looks at; messages in the order of their publication.
 

@@ -25,7 +25,7 @@ _LONGEST_GLANCE = 0.25
 """Between two looks [s]; more than this says that the machine stood still."""
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Picture:
     """The newest of everything, by the follower that it is of.
 

@@ -1,7 +1,7 @@
 """The estimator's step on plain records: a frame, a sighting or odometry in, and the track moves on.
 
 All that the estimator knows lies in rows that its owner keeps (:class:`Memory`) and in one record that is
-handed from step to step (:class:`Known`). Live daemons, lockstep, replay and sweeps call these same functions.
+handed from step to step (:class:`Known`). Live daemons, lockstep, replay and sweeps call these functions.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from estimation.own_motion.odometry_history import (
 from estimation.own_motion.own_track import (
     OwnNoise,
     OwnPoint,
-    foreseen,
     folded,
+    foreseen,
     motion_of,
     own_begun,
     own_followed,
@@ -40,7 +40,8 @@ from estimation.own_motion.own_track import (
     retold,
 )
 from estimation.tracking.estimate import Estimate, estimate_at
-from estimation.tracking.follower_check import BELIEVED, GATED as LEADER_OFF
+from estimation.tracking.follower_check import BELIEVED
+from estimation.tracking.follower_check import GATED as LEADER_OFF
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE, TrackPoint
 from estimation.tracking.tracker import (
     INITIALISING,
@@ -97,7 +98,7 @@ class Known(NamedTuple):
 
 
 class Taken(NamedTuple):
-    """What became of a frame or sighting: see ``estimation.tracking``; ``late``: captured before the newest."""
+    """What became of a frame or sighting: verdict and cause; ``late``: captured before the newest."""
 
     known: Known
     verdict: int
@@ -146,9 +147,10 @@ def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen
 @kernel
 def measured(rules: Rules, capture_ns: int, seen: PairSeen, motion: FollowerMotion) -> Measurement:
     """What a frame measures of the leader, by the front end."""
+    leader = (seen.leader_x, seen.leader_y)
     if rules.filter.in_world:
-        return measure_world(capture_ns, seen, rules.noise, motion)
-    return measure_body_from_mocap(capture_ns, seen, rules.noise, motion)
+        return measure_world(capture_ns, leader, seen.follower, rules.noise, motion)
+    return measure_body_from_mocap(capture_ns, leader, seen.follower, rules.noise, motion)
 
 
 @kernel
@@ -215,7 +217,12 @@ def _with_own_motion(known: Known, memory: Memory, rules: Rules, first: int) -> 
 @kernel
 def _put_motion(known: Known, memory: Memory, k: int, point: TrackPoint, motion: FollowerMotion) -> bool:
     was = point.measurement.motion
-    same = was.v2 == motion.v2 and was.u2 == motion.u2 and was.sd_v2 == motion.sd_v2 and was.sd_u2 == motion.sd_u2
+    same = (
+        was.v2 == motion.v2
+        and was.u2 == motion.u2
+        and was.sd_v2 == motion.sd_v2
+        and was.sd_u2 == motion.sd_u2
+    )
     if not same:
         store(memory.points, place(known.track, memory.points, k), with_motion(point, motion))
     return not same

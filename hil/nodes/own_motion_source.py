@@ -18,7 +18,7 @@ from hil.scenario.schema import Scenario
 _NS = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class OwnMotion:
     """What has been heard of the follower's motion.
 

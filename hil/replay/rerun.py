@@ -27,7 +27,7 @@ from hil.wire.messages import decode_as, typename_of
 M = TypeVar("M", bound=msg.Message)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Replay:
     """What came out of a replay of one follower's life.
 

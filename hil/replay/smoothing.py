@@ -48,7 +48,7 @@ class ListeningEstimator(EstimatorNode):
         return after, sent
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Smoothed:
     """Estimates at all captures, in their order, and the certified ones where they were asked for."""
 

@@ -13,6 +13,7 @@ from formation.speed_range import SpeedRange
 TURTLEBOT3 = Disturbed(1.5, Spacing(0.2, 20.0), SpeedRange(0.08, 0.08), 0.7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speeds", [(0.08, 0.08), (0.07, 0.09)])
 def test_no_leader_drives_a_pair_out_of_its_set_but_some_come_to_the_edge(
     speeds: tuple[float, float],

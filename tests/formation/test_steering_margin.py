@@ -89,6 +89,7 @@ def swinging(k_u: float) -> Table:
     return Table((0.0, 30.0, 30.02, 60.0), (V1,) * 4, (k_u, k_u, -k_u, -k_u))
 
 
+@pytest.mark.slow
 def test_above_the_bracket_a_swing_loses_the_formation(margin: SteeringMargin) -> None:
     times = np.linspace(0.0, 40.0, 401)
     for share, lost in ((0.98, False), (1.03, True)):

@@ -68,6 +68,7 @@ def test_lag_and_delay_are_found_within_what_is_said_of_them(
     assert found.delay.value == pytest.approx(found.lag.value + found.transport.value, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_standard_deviations_are_those_of_the_errors() -> None:
     errors = []
     for seed in range(6):

@@ -201,6 +201,7 @@ def quantities(state: FloatArray, pose: FloatArray, v2: FloatArray, u2: FloatArr
     return np.stack([seen.real, seen.imag / np.abs(line) - u2, np.abs(w), alpha1, state[..., 4]], axis=-1)
 
 
+@pytest.mark.slow
 def test_an_independent_filter_on_random_leaders_comes_close_to_the_bound_and_not_below() -> None:
     generator = np.random.default_rng(11)
     runs, steps, late = 150, 300, 180

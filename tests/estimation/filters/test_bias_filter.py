@@ -78,6 +78,7 @@ def alpha1_error(belief: Belief, seen: Measurement, alpha1: float) -> tuple[floa
     return float(wrap(found.alpha1 - alpha1)), math.sqrt(found.covariance[3, 3])
 
 
+@pytest.mark.slow
 def test_offsets_are_found_while_the_pair_moves_against_each_other() -> None:
     plain: list[float] = []
     biased: list[float] = []
@@ -97,6 +98,7 @@ def test_offsets_are_found_while_the_pair_moves_against_each_other() -> None:
     assert np.std(biased) < 0.5 * np.sqrt(np.mean(np.square(plain)))
 
 
+@pytest.mark.slow
 def test_what_a_kept_formation_cannot_tell_stays_unknown_and_is_told_so() -> None:
     errors = []
     for seed in range(12):

@@ -81,6 +81,7 @@ def score(of: Estimator, bandwidth: float, runs: int = 6, steps: int = 480, late
     return Score(*np.mean(rows, axis=0).tolist())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("bandwidth", "other"), [(GENTLE, AGILE), (AGILE, GENTLE)])
 def test_whatever_the_leader_it_comes_close_to_the_filter_made_for_it(bandwidth: float, other: float) -> None:
     made_for_it = score(ExtendedFilter(model(bandwidth)), bandwidth)

@@ -143,6 +143,7 @@ def test_prediction_and_update_leave_their_arguments_alone(kind: str) -> None:
     assert np.array_equal(first.covariance, again.covariance)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ekf", "ukf"])  # filterpy's give the same: test_compiled
 def test_on_random_leaders_it_is_consistent_and_close_to_the_bound(kind: str) -> None:
     runs, steps, late = 16, 420, 180

@@ -58,6 +58,7 @@ def test_where_all_is_linear_any_window_gives_the_kalman_filter() -> None:
             assert left.covariance == pytest.approx(right.covariance, rel=1e-6, abs=1e-13)
 
 
+@pytest.mark.slow
 def test_on_random_leaders_it_is_as_good_as_the_filter() -> None:
     generator = np.random.default_rng(2)
     squares, nis = [], []

@@ -71,6 +71,7 @@ def estimates(beliefs: list[Belief], seen: list[Measurement]) -> list[Estimate]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("front_end", list(FrontEnd))
 def test_where_it_is_easy_it_agrees_with_the_cartesian_filter(front_end: FrontEnd) -> None:
     gaps, spreads, deviations, nis = [], [], [], []

@@ -35,6 +35,7 @@ def folded(poses: list[Pose], odometry: FollowerMotion | None = None, span: floa
     return track
 
 
+@pytest.mark.slow
 def test_errors_are_as_large_as_the_filter_says() -> None:
     errors, sds = [], []
     for seed in range(60):
@@ -47,6 +48,7 @@ def test_errors_are_as_large_as_the_filter_says() -> None:
     assert (ratio < 1.1).all()
 
 
+@pytest.mark.slow
 def test_a_filter_that_moves_as_assumed_has_the_variance_it_says() -> None:
     generator, ends = np.random.default_rng(4), []
     step = FRAME_NS * 1e-9

@@ -73,6 +73,7 @@ def errors(points: Sequence[TrackPoint], truth: Matrix, poses: Sequence[Pose]) -
     return np.array(rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("front_end", list(FrontEnd))
 def test_knowing_the_future_beats_the_filter(front_end: FrontEnd) -> None:
     generator = np.random.default_rng(5)

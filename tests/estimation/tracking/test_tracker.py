@@ -149,6 +149,7 @@ def hash_of(*values: float) -> int:
     return round(1000.0 * sum(abs(value) * (k + 1) for k, value in enumerate(values)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "front_end"), CASES)
 def test_when_it_says_tracking_the_direction_is_known(kind: str, front_end: FrontEnd) -> None:
     errors = []
@@ -247,6 +248,7 @@ def test_a_leader_that_jumped_a_little_is_taken_up_again_after_some_frames_that_
     assert status_now(of, track) is Status.TRACKING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "front_end"), CASES)
 def test_one_that_jumped_far_is_given_time_to_come_back_until_it_is_lost(
     kind: str, front_end: FrontEnd

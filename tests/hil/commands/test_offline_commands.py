@@ -138,6 +138,7 @@ def test_verify_of_a_log_without_estimates_fails(abreast: Any, imported: Path) -
     assert "nothing to verify" in said.err
 
 
+@pytest.mark.slow
 def test_another_estimator_has_its_own_figures(abreast: Any, run_log: Path) -> None:
     same = summary(abreast("replay", run_log, "--json"))
     other = summary(abreast("replay", run_log, "--estimator", "difference", "--json"))
@@ -147,6 +148,7 @@ def test_another_estimator_has_its_own_figures(abreast: Any, run_log: Path) -> N
     assert other["estimation"]["rmse"]["v1"] > 1.1 * same["estimation"]["rmse"]["v1"]
 
 
+@pytest.mark.slow
 def test_from_and_to_limit_what_is_judged_and_not_what_is_stepped(
     abreast: Any, run_log: Path, tmp_path: Path
 ) -> None:

@@ -42,6 +42,7 @@ def ink(image: Image.Image) -> float:
     return float(np.mean(np.any(np.asarray(image) < 250, axis=2)))
 
 
+@pytest.mark.slow
 def test_a_run_is_drawn_small_and_the_same_every_time(short_log: Log, tmp_path: Path) -> None:
     evidence = evidence_of_log(short_log)
     first, again = drawn(evidence, tmp_path / "a.png"), drawn(evidence, tmp_path / "b.png")

@@ -78,6 +78,7 @@ def test_limits_show_where_they_matter(axes: Axes, scenario: Scenario, trajector
     assert [-2.84, -2.84] in heights(axes)
 
 
+@pytest.mark.slow
 def test_pictures_repeat_to_the_byte(tmp_path: Path, scenario: Scenario, trajectory: Trajectory) -> None:
     for name in ("a", "b"):
         draw_simulation(scenario, trajectory, None, tmp_path / f"{name}.simulation.png")

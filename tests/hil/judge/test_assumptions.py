@@ -61,7 +61,7 @@ def test_only_inputs_whose_truth_is_known_are_asked(exact_evidence: Evidence) ->
     assert judged(replace(exact_evidence, truth=[])) == {}
 
 
-@pytest.mark.skipif("ABREAST_REAL" not in os.environ, reason="ABREAST_REAL names no folder of recordings")
+@pytest.mark.real
 def test_on_a_real_recording_extended_bounds_hold_wherever_their_assumptions_do(tmp_path: Path) -> None:
     """Raw, its range is off by more than was assumed, and that is said; calibrated, all is as assumed."""
     recording = Path(os.environ["ABREAST_REAL"]) / "turtlebot3_lidar_optitrack.csv"

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 from hil.live.certificate_process import CertificateProcess
 from hil.log.metadata import CERTIFICATE
 from hil.log.report_json import known
@@ -10,6 +12,7 @@ from hil.scenario.files import load_scenario
 from tests.hil.live.child_run import PATIENCE
 
 
+@pytest.mark.slow
 def test_the_certificate_comes_once_and_is_the_scenario_s_own() -> None:
     scenario = load_scenario("turtlebot3", ["leader.k_u=0.6"])
     process = CertificateProcess(scenario, niceness=0)

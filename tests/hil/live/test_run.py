@@ -101,6 +101,7 @@ def test_a_run_estimates_drives_stops_and_leaves_nothing_behind(start: Callable[
     assert max(abs(truth[-1].v1), abs(truth[-1].v2)) < STILL_V
 
 
+@pytest.mark.slow
 def test_a_killed_estimator_fails_the_run_and_stops_every_follower(start: Callable[..., Run]) -> None:
     followers = ("follower", "agent3")
     run = start("--set", "chain.agents=3", duration=600.0, scenario="chain5-turtlebot3")
@@ -124,6 +125,7 @@ def test_a_killed_estimator_fails_the_run_and_stops_every_follower(start: Callab
         assert max(abs(moving.v1), abs(moving.v2)) < STILL_V
 
 
+@pytest.mark.slow
 def test_without_a_controller_somebody_else_stops_the_robot(start: Callable[..., Run]) -> None:
     run = start(duration=600.0)
     run.wait_until_driving(topics.TRUTH)
@@ -148,6 +150,7 @@ def test_an_end_that_is_asked_for_while_starting_leaves_no_process(start: Callab
     assert run.daemons() == {}
 
 
+@pytest.mark.slow
 def test_a_killed_supervisor_takes_its_daemons_along(start: Callable[..., Run]) -> None:
     run = start(duration=600.0)
     run.wait_until_driving(topics.TRUTH)
@@ -159,6 +162,7 @@ def test_a_killed_supervisor_takes_its_daemons_along(start: Callable[..., Run]) 
     assert run.daemons() == {}
 
 
+@pytest.mark.slow
 def test_a_killed_recorder_leaves_a_log_that_is_made_whole(start: Callable[..., Run]) -> None:
     run = start(duration=600.0)
     run.wait_until_driving(topics.TRUTH)
@@ -173,6 +177,7 @@ def test_a_killed_recorder_leaves_a_log_that_is_made_whole(start: Callable[..., 
     assert killed_at - MOMENTS < max(logged) < killed_at + 0.1
 
 
+@pytest.mark.slow
 def test_nonsense_moves_nobody_and_an_interrupt_leaves_a_whole_log(start: Callable[..., Run]) -> None:
     each, rounds = 100, 5
     run = start(duration=600.0)

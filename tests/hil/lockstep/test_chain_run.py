@@ -72,6 +72,7 @@ def test_a_chain_leaves_log_summary_and_picture(folder: Path) -> None:
         assert "unknown_body" not in pair.get("rejected", {})
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not(folder: Path, tmp_path: Path) -> None:
     short = (*GIVEN, "run.duration_s=0.5")
     logs = []
@@ -83,6 +84,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_does_not(folder: Path, t
     assert logs[0] == logs[1] != logs[2]
 
 
+@pytest.mark.slow
 def test_every_follower_repeats_bit_for_bit(folder: Path) -> None:
     result = abreast("replay", str(folder / "run.mcap"), "--verify", "--json")
     assert result.code == 0, result.stderr
@@ -92,6 +94,7 @@ def test_every_follower_repeats_bit_for_bit(folder: Path) -> None:
     assert [pair["parity"]["estimates"]["compared"] > 300 for pair in found["pairs"]] == [True, True]
 
 
+@pytest.mark.slow
 def test_one_follower_of_a_chain_is_replayed_like_a_pair(folder: Path, tmp_path: Path) -> None:
     log, out = folder / "run.mcap", tmp_path / "out"
     given = (str(log), "--follower", "agent3", "--verify", "--out", str(out), "--json")

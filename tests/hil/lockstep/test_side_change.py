@@ -62,6 +62,7 @@ def test_a_chain_is_not_told_to_change() -> None:
         refuse_unrunnable(load_scenario("chain5-turtlebot3", ["formation.change_sides_at_s=[1.0]"]))
 
 
+@pytest.mark.slow
 def test_a_driven_pair_changes_sides_as_without_noise_and_replays_bit_for_bit(tmp_path: Path) -> None:
     times = ["run.duration_s=17.0", "run.evaluate_from_s=14.5", "formation.change_sides_at_s=[1.0, 2.0, 3.0]"]
     run_lockstep(load_scenario("changing-sides", times), tmp_path / "run.mcap")

@@ -32,6 +32,7 @@ NODES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("front_end", "count"), [("world", 12), ("body", 3)])
 @pytest.mark.parametrize("fault", list(BENCHMARK.FAULTS))
 def test_no_wrong_estimate_is_marked_as_good_and_none_is_locked_out(

@@ -174,7 +174,7 @@ def test_a_log_that_exists_is_kept(driven: list[Truth], tmp_path: Path) -> None:
     assert (tmp_path / "lab.mcap").read_bytes() == b"precious"
 
 
-@pytest.mark.skipif(REAL not in os.environ, reason=f"{REAL} does not name the folder of real recordings")
+@pytest.mark.real
 def test_a_pair_of_real_robots_is_followed_through_a_misassociation(tmp_path: Path) -> None:
     recording = Path(os.environ[REAL]) / "turtlebot3_lidar_optitrack.csv"
     import_csv(recording, load_column_map("turtlebot3_lidar_optitrack"), tmp_path / "real.mcap")

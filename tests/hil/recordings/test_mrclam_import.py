@@ -144,7 +144,8 @@ def first_minute(out: Path, leader: int, follower: int) -> Path:
     return out
 
 
-@pytest.mark.skipif(REAL not in os.environ, reason=f"{REAL} does not name the folder of real recordings")
+@pytest.mark.slow
+@pytest.mark.real
 def test_a_real_leader_is_followed_and_commands_are_seen_to_run_ahead(tmp_path: Path) -> None:
     import_mrclam(first_minute(tmp_path / "mrclam6", 1, 2), 1, 2, tmp_path / "real.mcap")
     log = read_log(tmp_path / "real.mcap")

@@ -129,7 +129,7 @@ def test_a_span_that_is_too_short_is_refused(recording: Path, tmp_path: Path) ->
         calibrate(log, scenario, to_s=100.5)
 
 
-@pytest.mark.skipif(REAL not in os.environ, reason=f"{REAL} does not name the folder of real recordings")
+@pytest.mark.real
 def test_the_first_seconds_of_a_real_log_calibrate_its_scanner(tmp_path: Path) -> None:
     source = Path(os.environ[REAL]) / "turtlebot3_lidar_optitrack.csv"
     import_csv(source, load_column_map("turtlebot3_lidar_optitrack"), tmp_path / "real.mcap")

@@ -67,6 +67,7 @@ def test_what_cannot_be_known_is_absent(tmp_path: Path) -> None:
     assert judge_own_motion(logged(tmp_path / "blind.mcap", mocap=False), SCENARIO) == {}
 
 
+@pytest.mark.slow
 def test_a_replay_tells_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     logged(tmp_path / "run.mcap")
     with pytest.raises(SystemExit) as done:

@@ -29,7 +29,8 @@ QUIET = (
 @pytest.fixture(scope="session")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
     """Headless Chromium that reaches no network."""
-    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+    driver = shutil.which("chromedriver")
     if chromium is None or driver is None:
         pytest.skip("no Chromium on this machine: apt-get install chromium chromium-driver")
     chrome = started(chromium, driver, tmp_path_factory)

@@ -48,6 +48,7 @@ def written(short_log: Log, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [360, 1280])
 def test_a_report_opens_without_a_network_and_fits_the_screen(
     browser: Chrome, written: Path, width: int
@@ -103,6 +104,7 @@ def test_what_is_not_known_is_left_out(
     assert not re.search(r"\b(nan|None|inf)\b", said)
 
 
+@pytest.mark.slow
 def test_the_same_run_gives_the_same_report(written: Path, short_log: Log) -> None:
     again = report(evidence_of_log(short_log))
     assert renumbered(again) == renumbered(written.read_text(encoding="utf-8"))
@@ -118,6 +120,7 @@ def renumbered(page: str) -> str:
 EVIL = "</title></script><script>alert(1)</script>"
 
 
+@pytest.mark.slow
 def test_certified_radii_are_drawn_with_the_estimates(exact_evidence: Evidence) -> None:
     certified = [
         CertifiedEstimate(each.header, each.computed, each.v1, 0.02, each.alpha1, 0.3, 50, "")

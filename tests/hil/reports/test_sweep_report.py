@@ -64,6 +64,7 @@ return [Array.from(source.row), Array.from(source.column), Array.from(source.tex
 """
 
 
+@pytest.mark.slow
 def letters(browser: Chrome, plot: int) -> dict[tuple[str, str], str]:
     """What a heat map says now, by position and heading noise."""
     rows, columns, texts = browser.execute_script(_LETTERS, plot)

@@ -107,6 +107,7 @@ def test_no_orbit_is_reported_where_there_is_none() -> None:
     assert "orbit" not in report_of("turtlebot3", constant, "run.duration_s=1.0")
 
 
+@pytest.mark.slow
 def test_the_shortest_duration_still_has_a_start_and_an_end(tmp_path: Path) -> None:
     report_of("turtlebot3", "run.duration_s=1e-6", out=tmp_path)
     assert len((tmp_path / "trajectory.csv").read_text().splitlines()) == 3

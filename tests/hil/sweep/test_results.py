@@ -139,6 +139,7 @@ def test_a_sweep_that_was_killed_while_it_marked_its_folder_goes_on(
             Store(folder, make_sweep(seed=5))
 
 
+@pytest.mark.slow
 def test_two_workers_give_the_bits_of_one(make_sweep: Callable[..., Sweep], tmp_path: Path) -> None:
     sweep = make_sweep()
     one, two = flown(sweep, tmp_path / "one"), flown(sweep, tmp_path / "two", workers=2)
@@ -182,6 +183,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]
             process.wait()
 
 
+@pytest.mark.slow
 def test_a_cluster_that_loses_a_worker_loses_nothing(
     make_sweep: Callable[..., Sweep], cluster: tuple[str, list[subprocess.Popen[bytes]]]
 ) -> None:
@@ -213,6 +215,7 @@ def test_without_dask_the_error_says_what_to_install(
         list(fly_on_cluster(sweep, list(pieces_of(sweep)), "tcp://127.0.0.1:1"))
 
 
+@pytest.mark.slow
 def test_the_worst_run_is_kept_and_linked_from_the_report(
     make_sweep: Callable[..., Sweep], tmp_path: Path
 ) -> None:

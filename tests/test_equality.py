@@ -1,0 +1,95 @@
+"""Records that hold arrays are compared by what they are, never by ``==`` over their fields.
+
+``==`` of two arrays is an array, which is neither true nor false. The comparison that a dataclass is given
+hides that as long as both records hold the same array object, and not even then from Python 3.13 on.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import typing
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+PACKAGES = ("formation", "controllers", "estimation", "hil")
+
+
+def records() -> Iterator[type]:
+    """Every dataclass of the four packages."""
+    for package in PACKAGES:
+        for found in pkgutil.walk_packages(importlib.import_module(package).__path__, f"{package}."):
+            if found.name.endswith(".__main__"):
+                continue
+            module = importlib.import_module(found.name)
+            for each in vars(module).values():
+                if isinstance(each, type) and is_dataclass(each) and each.__module__ == found.name:
+                    yield each
+
+
+def held_types(record: type) -> list[Any]:
+    """Types of a record's fields, for a dataclass or a named tuple."""
+    names = [each.name for each in fields(record)] if is_dataclass(record) else record._fields  # type: ignore[attr-defined]
+    # Classes that rosbags generates name ClassVar without importing it.
+    hints = typing.get_type_hints(record, localns={"ClassVar": ClassVar})
+    return [hints[name] for name in names]
+
+
+def holds_array(kind: Any, within: tuple[type, ...] = ()) -> bool:
+    """Whether a value of a type may hold an array, however deep."""
+    if np.ndarray in (kind, typing.get_origin(kind)):
+        return True
+    if typing.get_origin(kind) is Callable:
+        return False
+    if isinstance(kind, type) and (is_dataclass(kind) or hasattr(kind, "_fields")):
+        return kind not in within and any(holds_array(each, (*within, kind)) for each in held_types(kind))
+    return any(holds_array(each, within) for each in typing.get_args(kind))
+
+
+def compares_fields(record: type) -> bool:
+    """Whether a dataclass has the comparison that is made for it."""
+    return record.__dataclass_params__.eq and "__eq__" in vars(record)  # type: ignore[attr-defined, no-any-return]
+
+
+def test_no_record_with_an_array_is_compared_field_by_field() -> None:
+    found = {each for each in records() if holds_array(each)}
+    assert {"Measurement", "TrackPoint", "Estimate", "InvariantSet"} <= {each.__name__ for each in found}
+    wrong = sorted(f"{each.__module__}.{each.__name__}" for each in found if compares_fields(each))
+    assert not wrong, "give these eq=False: " + ", ".join(wrong)
+
+
+class Named(NamedTuple):
+    values: NDArray[np.float64]
+
+
+@dataclass
+class Direct:
+    values: NDArray[np.float64] | None
+
+
+@dataclass
+class Deep:
+    inner: dict[str, tuple[Direct, ...]]
+
+
+@dataclass
+class Tupled:
+    named: Named
+
+
+@dataclass
+class Plain:
+    number: float
+    again: Plain | None
+    fill: Callable[[NDArray[np.float64]], None]
+
+
+@pytest.mark.parametrize(("record", "holds"), [(Direct, True), (Deep, True), (Tupled, True), (Plain, False)])
+def test_arrays_are_found_however_deep(record: type, holds: bool) -> None:
+    assert holds_array(record) is holds
+    assert compares_fields(record)
