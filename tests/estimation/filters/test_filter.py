@@ -8,16 +8,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from estimation.filters.compiled import CompiledExtended, CompiledUnscented
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimation.filters import kernels
 from estimation.filters.belief import Belief, Model, innovation
-from estimation.filters.compiled import CompiledExtended, CompiledUnscented
 from estimation.filters.estimator import Estimator
 from estimation.filters.kalman import ExtendedFilter, UnscentedFilter
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, Measurement
-from estimation.models.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise, Vector
+from estimation.models.motion import Matrix, Vector
 
 LIMITS = LeaderLimits(v_eps=0.04, k_v=0.3, k_u=0.7)
 WORLD = Model(FrontEnd.WORLD, LIMITS, ProcessNoise.by_rule(LIMITS, 0.5))
