@@ -123,9 +123,9 @@ class ControllerNode:
                 return replace(state, refused=counted(state.refused, "malformed")), ()
             if not estimate.measured_ns <= estimate.capture_ns <= now_ns + CLOCK_TOLERANCE_NS:
                 return replace(state, refused=counted(state.refused, "bad_stamp")), ()
-            fresh = estimate.status is Status.TRACKING
+            fresh = estimate.status == Status.TRACKING
             kept = estimate if fresh else state.estimate
-            state = replace(state, status=estimate.status, heard=True, estimate=kept)
+            state = replace(state, status=Status(estimate.status), heard=True, estimate=kept)
             if fresh:
                 ahead = self._ahead(estimate, now_ns)
                 state = replace(state, trend=self.leader_turn.trend(state.trend, estimate, ahead))

@@ -8,7 +8,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TypeVar
 
-from estimation.own_motion.inputs import MotionSample
+from estimation.own_motion.odometry_history import MotionSample
 from formation.pose import Pose
 from hil.errors import AbreastError
 from hil.wire import message_types as msg
