@@ -245,14 +245,14 @@ def encoded(program: LeaderProgram) -> tuple[Program, Rows[TableRow]]:
     nothing = rows_of(TableRow, 0)
     match program:
         case Constant(v, u):
-            return Program(ProgramKind.CONSTANT, v, u, 0.0, 0.0), nothing
+            return Program(ProgramKind.CONSTANT.value, v, u, 0.0, 0.0), nothing
         case Sinusoid(v, u_mean, u_amplitude, omega):
-            return Program(ProgramKind.SINUSOID, v, u_mean, u_amplitude, omega), nothing
+            return Program(ProgramKind.SINUSOID.value, v, u_mean, u_amplitude, omega), nothing
         case Impulse(v, u_amplitude, t_centre, t_width):
-            return Program(ProgramKind.IMPULSE, v, u_amplitude, t_centre, t_width), nothing
+            return Program(ProgramKind.IMPULSE.value, v, u_amplitude, t_centre, t_width), nothing
         case Table(t, v, u):
             rows = rows_of(TableRow, len(t))
             for k, row in enumerate(zip(t, v, u, strict=True)):
                 store(rows, k, TableRow(*row))
-            return Program(ProgramKind.TABLE, 0.0, 0.0, 0.0, 0.0), rows
+            return Program(ProgramKind.TABLE.value, 0.0, 0.0, 0.0, 0.0), rows
     raise ValueError(f"{type(program).__name__} is no kind of program that compiled code can be given")
