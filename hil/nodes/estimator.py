@@ -81,6 +81,10 @@ class EstimatorState(Struct, frozen=True):
     last_out_ns: int = 0
     heard_ns: int = 0
 
+    def copy(self) -> EstimatorState:
+        """The same state with a memory of its own: a step changes that of the state it is given."""
+        return replace(self, memory=self.memory.copy())
+
 
 class EstimatorNode:
     """Pure step of the estimator of one follower. Raises :class:`UsageError` for one that is not live.
@@ -97,6 +101,7 @@ class EstimatorNode:
         self.topics = topics_of(scenario)
         self.front_end = FrontEnd(given.front_end)
         self.rules = rules_of(scenario)
+        EstimatorMemory(self.rules)  # now, and not with the first message, all is compiled or loaded
         self.aligns = given.align_odometry and given.own_motion != "mocap"
         self.assumed = AssumedErrors.of(scenario)
         self.frame_time = FrameTime(scenario)

@@ -75,6 +75,13 @@ class EstimatorMemory:
         else:
             self._points = cast("Rows[TrackPoint]", [None] * self._room)
 
+    def copy(self) -> EstimatorMemory:
+        """The same memory, to go on from twice."""
+        twin = EstimatorMemory(self.rules)
+        for name in ("_points", "_history", "_own", "_known"):
+            setattr(twin, name, getattr(self, name).copy())
+        return twin
+
     @property
     def known(self) -> Known:
         """Where the rows are filled."""
