@@ -5,7 +5,7 @@ The rows' number is a power of two, so that a place wraps round by a mask.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from formation.kernel import kernel
 from formation.records import Rows, size
@@ -22,12 +22,12 @@ EMPTY = Ring(0, 0)
 
 
 @kernel
-def place(ring: Ring, rows: Rows[tuple[object, ...]], k: int) -> int:
+def place(ring: Ring, rows: Rows[Any], k: int) -> int:
     """Row of the ring's k-th record, the oldest being the 0th; k may be ``length``, the next to be filled."""
     return (ring.first + k) & (size(rows) - 1)
 
 
 @kernel
-def without_oldest(ring: Ring, rows: Rows[tuple[object, ...]], dropped: int) -> Ring:
+def without_oldest(ring: Ring, rows: Rows[Any], dropped: int) -> Ring:
     """Ring without its oldest records."""
     return Ring(place(ring, rows, dropped), ring.length - dropped)

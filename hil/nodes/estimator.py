@@ -10,6 +10,7 @@ from dataclasses import replace as with_changes
 from msgspec import Struct, field
 from msgspec.structs import replace
 
+from controllers.guard import CLOCK_TOLERANCE_NS
 from estimation.models.measurement import (
     FrontEnd,
     Measurement,
@@ -49,7 +50,7 @@ from hil.wire import topics
 from hil.wire.certified_message import certified_message
 from hil.wire.estimate_message import AssumedErrors, to_message
 from hil.wire.events import Event
-from hil.wire.intake import CLOCK_TOLERANCE_NS, RefusedError, read_frame, read_odometry, read_sighting
+from hil.wire.intake import RefusedError, read_frame, read_odometry, read_sighting
 from hil.wire.message_types import Consumed
 from hil.wire.topics import topics_of
 

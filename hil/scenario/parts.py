@@ -76,4 +76,4 @@ def foresight(scenario: Scenario) -> Foresight:
     leader, given = scenario.leader, scenario.estimator
     limits = LeaderLimits(leader.v_eps, leader.k_v, leader.k_u)
     noise = ProcessNoise.by_rule(limits, given.turn_bandwidth, given.speed_bandwidth)
-    return Foresight(leader.k_u, noise.q_u)
+    return Foresight.of(leader.k_u, noise.q_u)
