@@ -8,6 +8,7 @@ from collections.abc import Callable
 from msgspec import Struct, field
 from msgspec.structs import replace
 
+from controllers.guard import CLOCK_TOLERANCE_NS
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import FrontEnd, PairSeen, from_sensor, measure_body
 from estimation.own_motion.odometry_correction import (
@@ -46,7 +47,7 @@ from hil.wire import topics
 from hil.wire.certified_message import certified_message
 from hil.wire.estimate_message import AssumedErrors, to_message
 from hil.wire.events import Event
-from hil.wire.intake import CLOCK_TOLERANCE_NS, RefusedError, read_frame, read_odometry, read_sighting
+from hil.wire.intake import RefusedError, read_frame, read_odometry, read_sighting
 from hil.wire.message_types import Consumed
 from hil.wire.topics import topics_of
 

@@ -6,7 +6,7 @@ one place) is answered here, with a :class:`~hil.errors.UsageError` that names t
 
 from __future__ import annotations
 
-from controllers.laws import LAWS, Gains
+from controllers.laws import Gains
 from controllers.limits import Limits
 from controllers.side_change import gentle
 from controllers.station_keeper import StationKeeper
@@ -64,7 +64,6 @@ def may_change_sides(scenario: Scenario) -> bool:
 def station_keeper(scenario: Scenario) -> StationKeeper:
     """The scenario's law at the follower's station, whichever side that comes to be on."""
     return StationKeeper(
-        LAWS[scenario.controller.law],
         gains(scenario),
         limits(scenario),
         knows_turn=knows_turn(scenario),
@@ -74,4 +73,4 @@ def station_keeper(scenario: Scenario) -> StationKeeper:
 
 def foresight(scenario: Scenario) -> Foresight:
     """What is known of the leader's steering; its diffusion is that of the estimator's own model."""
-    return Foresight(scenario.leader.k_u, process_noise(scenario).q_u)
+    return Foresight.of(scenario.leader.k_u, process_noise(scenario).q_u)

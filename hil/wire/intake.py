@@ -8,14 +8,12 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TypeVar
 
+from controllers.guard import CLOCK_TOLERANCE_NS
 from estimation.own_motion.odometry_history import MotionSample
 from formation.pose import Pose
 from hil.errors import AbreastError
 from hil.wire import message_types as msg
 from hil.wire.messages import MalformedPayloadError, decode_as, to_ns
-
-CLOCK_TOLERANCE_NS = 50_000_000
-"""How far in the future a stamp may lie before it is refused: more than this is a wrong clock."""
 
 FARTHEST = 1e4
 """Largest coordinate or range [m] that is believed; beyond it the squares of a filter lose their meaning."""

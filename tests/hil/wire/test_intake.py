@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from controllers.guard import CLOCK_TOLERANCE_NS
 from formation.angles import wrap
 from formation.pose import Motion, Pose
 from hil.emulator.lab_messages import frame_message, odometry_message
 from hil.wire import message_types as msg
 from hil.wire.intake import (
-    CLOCK_TOLERANCE_NS,
     FARTHEST,
     FASTEST,
     RefusedError,
