@@ -22,6 +22,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from estimation.own_motion.inputs import mean_motion
+
 from benchmarks.random_leaders import random_leader
 from estimation.consistency.cramer_rao import TruePath, cramer_rao
 from estimation.filters.belief import Belief, Model, innovation
@@ -29,7 +31,6 @@ from estimation.filters.estimator import Estimator
 from estimation.filters.estimators import ESTIMATORS, make_estimator
 from estimation.models.measurement import FrontEnd, Measurement, PoseNoise, measure_world
 from estimation.models.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise
-from estimation.own_motion.inputs import mean_motion
 from estimation.tracking.estimate import estimate_of
 from estimation.tracking.smoother import smooth
 from estimation.tracking.tracker import Status, Tracker, TrackSettings

@@ -9,7 +9,7 @@ from estimation.time.clock import Arrival, heard
 from estimation.time.host_time import HostTime, on_host
 from hil.scenario.files import refuse_two_corrections
 from hil.scenario.schema import Scenario
-from hil.wire.intake import Frame
+from hil.wire.records import Frame
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,14 +7,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from estimation.filters.compiled import CompiledExtended
+from estimation.own_motion.inputs import mean_motion
 
 from estimation.filters.belief import Belief, Model
 from estimation.filters.bias_filter import BiasedExtended, offsets_of
-from estimation.filters.compiled import CompiledExtended
 from estimation.filters.estimator import Estimator
 from estimation.models.measurement import FrontEnd, Measurement, measure_body
 from estimation.models.motion import FollowerMotion, LeaderLimits, ProcessNoise, Vector
-from estimation.own_motion.inputs import mean_motion
 from estimation.tracking.estimate import estimate_of
 from estimation.tracking.tracker import Status
 from formation.angles import wrap

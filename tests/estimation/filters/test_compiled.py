@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from estimation.filters.compiled import CompiledExtended, CompiledUnscented
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimation.filters import kernels
 from estimation.filters.belief import Belief, Model, innovation
-from estimation.filters.compiled import CompiledExtended, CompiledUnscented
 from estimation.filters.estimator import Estimator
 from estimation.filters.kalman import ExtendedFilter, UnscentedFilter
 from estimation.models.measurement import FrontEnd, Measurement

@@ -4,10 +4,6 @@ import math
 from collections.abc import Iterable
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
-from estimation.models.motion import FollowerMotion
 from estimation.own_motion.inputs import (
     History,
     InputTrust,
@@ -16,6 +12,10 @@ from estimation.own_motion.inputs import (
     motion_at,
     remember,
 )
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from estimation.models.motion import FollowerMotion
 
 MS = 1_000_000
 TRUST = InputTrust(sd_v2=0.005, sd_u2=0.03)

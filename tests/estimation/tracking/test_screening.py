@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from estimation.tracking.screening import Cause, Watch, carried, cause_of, looked_at, watch_from
 
 from estimation.models.measurement import PairSeen, PoseNoise
 from estimation.models.motion import FollowerMotion
-from estimation.tracking.screening import Cause, Watch, carried, cause_of, looked_at, watch_from
 from formation.pose import Pose, advance
 
 NOISE = PoseNoise(3e-4, 3.5e-3)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from hil.wire.intake import read_frame
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom, kstest
@@ -26,7 +27,6 @@ from hil.emulator.mocap import (
     whole_ns,
 )
 from hil.emulator.robot import standing
-from hil.wire.intake import read_frame
 from hil.wire.messages import encode
 
 DELIVERY = Delivery(latency=0.03, jitter=0.02, loss=0.05)
