@@ -5,9 +5,8 @@ from __future__ import annotations
 import functools
 from collections.abc import Collection
 
-from estimation.own_motion.inputs import MotionSample
-
 from controllers.guard import CLOCK_TOLERANCE_NS
+from estimation.own_motion.odometry_history import MotionSample
 from formation.records import Rows, row_of, rows_of
 from hil.errors import AbreastError
 from hil.wire import entries
