@@ -29,7 +29,7 @@ from controllers import chain_kernels
 from controllers.chain import simulate_chain
 from controllers.laws import Gains
 from controllers.limits import Limits
-from formation.leader import Impulse
+from formation.leader import Impulse, encoded
 from formation.pose import Pose
 from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2, Shape
 from formation.spacing import Spacing
@@ -64,12 +64,12 @@ def plain_rates(t: float, state: FloatArray) -> list[float]:
 
 def kernel_rates(agents: int) -> Callable[[float, FloatArray], FloatArray]:
     """The same from the compiled kernel."""
-    setting = np.array([MU1, MU2, RHO_0, MU_RHO, V_MAX, 1e3, 0.0, 0.0, 1.0, 1.0])
-    program = np.array([[PROGRAM.v, PROGRAM.u_amplitude, PROGRAM.t_centre, PROGRAM.t_width]])
+    program, table = encoded(PROGRAM)
+    chain = chain_kernels.Chain(GAINS.settings(LIMITS), program, True)
     change, motions = np.empty(3 * agents), np.empty((3, agents))
 
     def rates(t: float, state: FloatArray) -> FloatArray:
-        chain_kernels.rates(t, state, setting, chain_kernels.IMPULSE, program, change, motions)
+        chain_kernels.rates_at(t, state, chain, table, change, motions)
         return change.copy()
 
     return rates

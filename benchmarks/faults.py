@@ -39,7 +39,7 @@ from estimation.tracking.tracker import Status
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
 from formation.shape import Shape, follower_pose, shape_of, shape_rates
-from hil.emulator.faults import Pair, faulty
+from hil.emulator.faults import Pair, fault_rows, faulty
 from hil.nodes.estimator import EstimatorNode
 from hil.scenario.files import load_scenario
 from hil.scenario.parts import gains, leader_program
@@ -160,10 +160,11 @@ def inject(
     back = math.inf
     for k, moment in enumerate(drive(node.scenario, generator, math.ceil(until / PERIOD))):
         t, capture_ns = k * PERIOD, (k + 120) * PERIOD_NS
-        shown = faulty([] if fault is None else [fault], t, PERIOD, moment.shown, last)
-        if shown is None:
+        faults = fault_rows([] if fault is None else [fault])
+        frame = faulty(faults, t, PERIOD, moment.shown, last or moment.shown)
+        if frame.lost:
             continue
-        last = shown
+        last = shown = frame.pair
         motion = follower_motion(moment.history, capture_ns, node.source.trust)
         measure = measure_world if node.front_end is FrontEnd.WORLD else measure_body_from_mocap
         leader = (shown.leader.x, shown.leader.y)
@@ -179,7 +180,7 @@ def inject(
             back = min(back, t - end)
         pair, found = moment.pair, estimate_at(track[-1], status)
         if stays and fault is not None and t > doubted and found.doubt is NO_DOUBT:
-            pair = faulty([fault], t, PERIOD, pair, None) or pair
+            pair = faulty(fault_rows([fault]), t, PERIOD, pair, pair).pair
         errors = errors_of(found, pair, moment.leader, moment.follower)
         sd = np.sqrt(np.diagonal(found.covariance)).tolist()
         bound_v1, bound_alpha1, _ = bounds_of(found, node.assumed)

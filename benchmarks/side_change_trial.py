@@ -8,7 +8,7 @@ from itertools import cycle
 
 import numpy as np
 
-from controllers.laws import LAWS, Gains
+from controllers.laws import Gains
 from controllers.limits import Limits
 from controllers.side_change import CORRECTION
 from controllers.side_change_run import LONGEST_STEP, run_with_changes
@@ -60,7 +60,6 @@ def random_run(setting: Setting, seed: int, *, knows_turn: bool, share: float = 
     turns = random.uniform(-1.0, 1.0, _KNOTS) * share * v1 / rho_0
     turns[-1] = 0.0
     moments = np.sort(random.uniform(0.0, _WANDERING * unit, random.integers(1, 6)))
-    law = LAWS["ideal" if knows_turn else "independent"]
     start = Shape(
         rho_0 * random.uniform(0.8, 1.5),
         ABREAST.alpha1 + random.uniform(-0.5, 0.5),
@@ -71,7 +70,7 @@ def random_run(setting: Setting, seed: int, *, knows_turn: bool, share: float = 
         leader,
         follower_pose(start, leader),
         Table(knots.tolist(), [v1] * _KNOTS, turns.tolist()),
-        StationKeeper(law, setting.gains, setting.limits, knows_turn=knows_turn, may_change=True),
+        StationKeeper(setting.gains, setting.limits, knows_turn=knows_turn, may_change=True),
         list(zip(moments.tolist(), cycle((Side.LEFT, Side.RIGHT)), strict=False)),
         np.arange(0.0, _WHOLE * unit, LONGEST_STEP),
     )

@@ -12,7 +12,7 @@ from controllers.laws import Gains
 from controllers.limits import Limits
 from formation.angles import FloatArray
 from formation.closed_loop import IntegrationError
-from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
+from formation.leader import LeaderProgram, encoded
 from formation.pose import Pose
 from formation.shape import Shape
 
@@ -64,39 +64,17 @@ def simulate_chain(
         raise ValueError("a chain needs at least one pair")
     if len(times) < 2 or not np.all(np.diff(times) > 0.0):
         raise ValueError("a trajectory needs at least two times, in increasing order")
-    kind, numbers = _encoded(program)
+    encoded_program, table = encoded(program)
     start = [number for shape in shapes for number in (shape.rho, shape.alpha1, shape.alpha2)]
     state = np.array([*start, first.x, first.y, first.theta])
     states = np.empty((len(times), len(state)))
     motions = np.empty((len(times), 3, len(shapes) + 1))
     moments = np.ascontiguousarray(times, dtype=np.float64)
-    setting = _setting(gains, limits, knows_turn=knows_turn)
-    step = program.longest_step
+    chain = kernels.Chain(gains.settings(limits), encoded_program, knows_turn)
+    solver = kernels.Solver(relative, absolute, program.longest_step)
     poses = np.empty((len(times), len(shapes) + 1, 3))
-    done = kernels.integrate(
-        moments, relative, absolute, step, state, setting, kind, numbers, states, motions, poses
-    )
+    done = kernels.integrate(moments, solver, state, chain, table, states, motions, poses)
     if not done or not np.all(np.isfinite(states)):
         raise IntegrationError("the motion of the chain breaks down before its end")
     pairs, (wanted, v, u) = states[:, :-3].reshape(len(times), -1, 3), motions.transpose(1, 0, 2)
     return ChainTrajectory(times, pairs[:, :, 0], pairs[:, :, 1], pairs[:, :, 2], wanted, v, u, poses)
-
-
-def _setting(gains: Gains, limits: Limits, *, knows_turn: bool) -> FloatArray:
-    spacing, station = gains.spacing, gains.station
-    of_law = (gains.mu1, gains.mu2, spacing.rho_0, spacing.mu_rho)
-    of_limits = (limits.v_max, limits.u_max, gains.tilt)
-    return np.array([*of_law, *of_limits, station.cos, station.sin, float(knows_turn)])
-
-
-def _encoded(program: LeaderProgram) -> tuple[int, FloatArray]:
-    match program:
-        case Constant(v, u):
-            return kernels.CONSTANT, np.array([[v, u]])
-        case Sinusoid(v, u_mean, u_amplitude, omega):
-            return kernels.SINUSOID, np.array([[v, u_mean, u_amplitude, omega]])
-        case Impulse(v, u_amplitude, t_centre, t_width):
-            return kernels.IMPULSE, np.array([[v, u_amplitude, t_centre, t_width]])
-        case Table(t, v, u):
-            return kernels.TABLE, np.array([t, v, u], dtype=np.float64)
-    raise ValueError(f"{type(program).__name__} is no kind of program that a chain can be given")

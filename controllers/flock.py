@@ -104,19 +104,16 @@ def simulate_flock(
     agents, steps = len(places), (samples - 1) * steps_per_sample
     motions_of_leader = [program(0.5 * step * k) for k in range(2 * steps + 1)]
     driven = np.array([(motion.v, motion.u) for motion in motions_of_leader])
-    setting = (gains.mu1, gains.mu2, gains.spacing.mu_rho, limits.v_max, limits.u_max, gains.tilt)
     poses, motions = np.empty((samples, agents, 3)), np.empty((samples, 4, agents))
     chosen = np.empty((samples, agents, choice.neighbours), dtype=np.int64)
     clearance = np.empty((samples, agents))
     done = kernels.integrate(
         driven,
-        step,
-        max(1, round(choice.every_s / step)),
-        steps_per_sample,
+        kernels.Timing(step, max(1, round(choice.every_s / step)), steps_per_sample),
         np.ascontiguousarray(first, dtype=np.float64),
         np.ascontiguousarray(places, dtype=np.float64),
         allowed,
-        np.array([*setting, float(knows_turn)]),
+        kernels.Flock(gains.settings(limits), knows_turn),
         poses,
         motions,
         chosen,

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from formation.kernel import kernel
 from formation.pose import Motion
 
 
+@kernel
 def clip(value: float, bound: float) -> float:
     """Nearest value to ``value`` in [-bound, bound]. NaN stays NaN: it must not turn into a limit."""
     if value > bound:
@@ -15,6 +17,18 @@ def clip(value: float, bound: float) -> float:
     if value < -bound:
         return -bound
     return value
+
+
+@kernel
+def limited(wanted: Motion, v_max: float, u_max: float) -> Motion:
+    """Speed and turn rate clipped, each on its own."""
+    return Motion(clip(wanted.v, v_max), clip(wanted.u, u_max))
+
+
+@kernel
+def is_beyond(wanted: Motion, v_max: float, u_max: float) -> bool:
+    """Whether speed or turn rate is beyond its limit."""
+    return abs(wanted.v) > v_max or abs(wanted.u) > u_max
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +52,4 @@ class Limits:
         An infinite value is clipped like any that is too large; NaN is passed on as NaN, for
         :func:`controllers.guard.decide` to refuse.
         """
-        allowed = Motion(clip(wanted.v, self.v_max), clip(wanted.u, self.u_max))
-        saturated = abs(wanted.v) > self.v_max or abs(wanted.u) > self.u_max
-        return allowed, saturated
+        return limited(wanted, self.v_max, self.u_max), is_beyond(wanted, self.v_max, self.u_max)

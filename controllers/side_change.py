@@ -15,14 +15,14 @@ Heading and speed go after w; the law takes over inside its proved region of att
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
-from controllers.laws import Gains, Law
-from controllers.limits import Limits
-from formation.angles import wrap
+from controllers.laws import Gains, LawSettings, law
+from formation.angles import wrapped
+from formation.kernel import kernel
+from formation.line import Line
 from formation.pose import Motion
-from formation.shape import Shape
-from formation.spacing import lyapunov
+from formation.spacing import lyapunov_at
 from formation.station import Side, Station
 
 SLACK = 0.3
@@ -32,80 +32,113 @@ PACE = 0.5
 CORRECTION = 0.4
 """Most that the correction may add to w [v1]: with the pace it leaves w a share ahead."""
 _TAKEN_OVER_V1, _TAKEN_OVER_ANGLE = 0.5, 0.5
+_TURN = 2.0 * math.pi
 
 
-@dataclass(frozen=True, slots=True)
-class SideChange:
-    """Where a follower is on its way: its aim, the phase [rad] of its place, and whether the law drives."""
+class SideChange(NamedTuple):
+    """Where a follower is on its way: the side it goes to, the phase of its place, whether the law drives.
 
-    station: Station
+    ``sign``: of the side, as in :class:`~formation.station.Station`. ``phase`` [rad] in [-pi, pi].
+    """
+
+    sign: float
     phase: float
-    arrived: bool = False
+    arrived: bool
+
+    @property
+    def side(self) -> Side:
+        """The side that it goes to, or is on."""
+        return Side.of(self.sign)
+
+
+class Led(NamedTuple):
+    """State of a change after a step, and the wanted motion, not yet limited."""
+
+    change: SideChange
+    wanted: Motion
+
+
+def kept(station: Station) -> SideChange:
+    """State of a follower that was never told to change."""
+    return SideChange(station.sign, station.alpha1, True)
+
+
+@kernel
+def is_gentle(v1: float, u1: float, rho_0: float) -> bool:
+    """Whether a leader turns gently enough for a change: what is missing without its u1 can be outweighed."""
+    return rho_0 * abs(u1) <= CORRECTION * v1
 
 
 def gentle(v1: float, u1: float, gains: Gains) -> bool:
-    """Whether a leader turns gently enough for a change: what is missing without its u1 can be outweighed."""
-    return gains.spacing.rho_0 * abs(u1) <= CORRECTION * v1
+    """The same for the spacing of a follower's gains."""
+    return is_gentle(v1, u1, gains.spacing.rho_0)
 
 
-def kept(gains: Gains) -> SideChange:
-    """State of a follower that was never told to change: it is where its gains have it."""
-    return SideChange(gains.station, gains.station.alpha1, arrived=True)
+@kernel
+def at_side(settings: LawSettings, sign: float) -> LawSettings:
+    """The law's numbers at the station of the same bearing on a side."""
+    if sign == settings.sign:
+        return settings
+    return settings._replace(sign=sign, sin_b=-settings.sin_b)
 
 
-def change_to(side: Side, shape: Shape, gains: Gains) -> SideChange:
-    """Begin to change to a side from the shape at hand, at the bearing of the station so far."""
-    return SideChange(Station(side, gains.station.bearing), shape.alpha1)
+@kernel
+def change_to(sign: float, line: Line) -> SideChange:
+    """Begin to change to a side from the line at hand."""
+    return SideChange(sign, math.atan2(line.sin1, line.cos1), False)
 
 
+@kernel
 def change_step(
-    change: SideChange,
-    shape: Shape,
-    v1: float,
-    u1: float,
-    law: Law,
-    gains: Gains,
-    limits: Limits,
-    dt: float,
-) -> tuple[SideChange, Motion]:
-    """State and wanted motion for the next dt [s]; once arrived the motion is the law's at the new station.
+    change: SideChange, settings: LawSettings, line: Line, v1: float, u1: float, dt: float
+) -> Led:
+    """State and wanted motion for the next dt [s] > 0; once arrived the motion is the law's at that side.
 
-    The motion is not yet limited, as a law's.
-
-    ``u1`` is the leader's turn rate, 0 where it isn't known: what is then missing acts as a disturbance of
-    rho_0 u1, which the correction meets only up to :data:`CORRECTION` v1.
+    ``settings``: for either side. ``u1`` is the leader's turn rate, 0 where it isn't known: what is then
+    missing acts as a disturbance of rho_0 u1, which the correction meets only up to :data:`CORRECTION` v1.
     """
-    there = replace(gains, station=change.station)
-    if change.arrived or _may_take_over(change, shape, gains):
-        return replace(change, arrived=True), law(shape, v1, u1, there, limits)
-    rho_0 = gains.spacing.rho_0
-    place = (rho_0 * math.cos(change.phase), rho_0 * math.sin(change.phase))
-    error_x = place[0] - shape.rho * math.cos(shape.alpha1)
-    error_y = place[1] - shape.rho * math.sin(shape.alpha1)
-    error = math.hypot(error_x, error_y)
-    left = _way_left(change)
+    there = at_side(settings, change.sign)
+    if change.arrived or _may_take_over(there, line):
+        return Led(change._replace(arrived=True), law(there, line, v1, u1))
+    return _led_round(change, there, line, v1, u1, dt)
+
+
+@kernel(inline=False)
+def _led_round(change: SideChange, there: LawSettings, line: Line, v1: float, u1: float, dt: float) -> Led:
+    rho_0 = there.rho_0
+    x, y = rho_0 * math.cos(change.phase), rho_0 * math.sin(change.phase)
+    error_x, error_y = x - line.rho * line.cos1, y - line.rho * line.sin1
+    error = math.sqrt(error_x * error_x + error_y * error_y)
+    left = _way_left(change, there)
     # Faded out, not switched off: a bang-bang pace would make the commands chatter.
     share = min(1.0, max(0.0, 2.0 - 2.0 * error / (SLACK * rho_0)))
     pace = math.copysign(share * PACE * v1 / rho_0, left)
     moved = left if abs(left) <= abs(pace) * dt else pace * dt
     turning = u1 + moved / dt
-    gain = min(gains.mu1, CORRECTION * v1 / error) if error > 0.0 else 0.0
-    w_x = v1 - turning * place[1] + gain * error_x
-    w_y = turning * place[0] + gain * error_y
+    gain = min(there.mu1, CORRECTION * v1 / error) if error > 0.0 else 0.0
+    w_x = v1 - turning * y + gain * error_x
+    w_y = turning * x + gain * error_y
     # Heading of the follower, and of w, from the leader's.
-    heading = shape.alpha1 + math.pi - shape.alpha2
-    aside = wrap(heading - math.atan2(w_y, w_x))
-    wanted = Motion(math.hypot(w_x, w_y) * max(0.0, math.cos(aside)), u1 - gains.mu2 * aside)
-    return replace(change, phase=wrap(change.phase + moved)), wanted
+    heading = math.atan2(line.sin1, line.cos1) + math.pi - math.atan2(line.sin2, line.cos2)
+    aside = wrapped(heading - math.atan2(w_y, w_x))
+    wanted = Motion(math.sqrt(w_x * w_x + w_y * w_y) * max(0.0, math.cos(aside)), u1 - there.mu2 * aside)
+    return Led(change._replace(phase=wrapped(change.phase + moved)), wanted)
 
 
-def _way_left(change: SideChange) -> float:
+@kernel
+def _way_left(change: SideChange, there: LawSettings) -> float:
     """Angle from the phase to the station's alpha1, the way round that does not pass ahead of the leader."""
-    phase, aim = change.phase % (2.0 * math.pi), change.station.alpha1 % (2.0 * math.pi)
-    return aim - phase
+    aim = math.atan2(-there.sin_b, -there.cos_b)
+    return (aim if aim >= 0.0 else aim + _TURN) - (
+        change.phase if change.phase >= 0.0 else change.phase + _TURN
+    )
 
 
-def _may_take_over(change: SideChange, shape: Shape, gains: Gains) -> bool:
-    if abs(wrap(shape.alpha2 - change.station.alpha2)) > _TAKEN_OVER_ANGLE:
+@kernel
+def _may_take_over(there: LawSettings, line: Line) -> bool:
+    """Whether alpha2 is near the station's, and the shape in the proved region."""
+    along = line.cos2 * there.cos_b + line.sin2 * there.sin_b
+    across = line.sin2 * there.cos_b - line.cos2 * there.sin_b
+    if abs(math.atan2(across, along)) > _TAKEN_OVER_ANGLE:
         return False
-    return lyapunov(shape, gains.spacing, change.station) < _TAKEN_OVER_V1
+    return lyapunov_at(line, there.cos_b, there.sin_b, there.rho_0, there.mu_rho) < _TAKEN_OVER_V1

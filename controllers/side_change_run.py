@@ -36,15 +36,15 @@ def run_with_changes(
     dt = float(times[1] - times[0])
     substeps = max(1, round(np.ceil(dt / LONGEST_STEP - 1e-9)))
     held, waiting = dt / substeps, deque(orders)
-    keeping = keeper.begin()
+    station = keeper.begin()
     rows: list[tuple[float, ...]] = []
     for t in times.tolist():
         for substep in range(substeps):
             now = t + substep * held
             shape, driven = shape_of(leader, follower), program(now + 0.5 * held)
             while waiting and now >= waiting[0][0]:
-                keeping = keeper.told(keeping, waiting.popleft()[1]) or keeping
-            keeping, wanted = keeper.drive(keeping, shape, driven, driven.u, held)
+                station = keeper.order(station, waiting.popleft()[1]) or station
+            station, wanted = keeper.drive(station, shape, driven, driven.u, held)
             motion, _ = keeper.limits.apply(wanted)
             if substep == 0:
                 places = (leader.x, leader.y, leader.theta, follower.x, follower.y, follower.theta)

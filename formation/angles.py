@@ -20,7 +20,8 @@ def wrapped(angle: float) -> float:
     """Angle [rad] in (-pi, pi] that differs by whole turns, exactly; NaN for NaN and infinities."""
     if not math.isfinite(angle):
         return math.nan
-    turned = angle if abs(angle) < _TURN else float(np.fmod(angle, _TURN))
+    # Of a positive number the remainder is exact, as fmod's is, which compiled code does not have.
+    turned = angle if abs(angle) < _TURN else math.copysign(abs(angle) % _TURN, angle)
     # Both shifts are exact: the operands are within a factor of two of each other (Sterbenz).
     if turned > math.pi:
         turned = turned - _TURN

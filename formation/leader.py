@@ -1,14 +1,99 @@
-"""Open-loop programs of the leader: speed and turn rate as functions of time."""
+"""Open-loop programs of the leader: speed and turn rate as functions of time.
+
+The classes check what they are given; compiled code has it as a :class:`Program` and rows, by
+:func:`encoded`. Both drive by the same kernels.
+"""
 
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import NamedTuple, Protocol, cast
 
+from formation.kernel import kernel
 from formation.pose import Motion
+from formation.records import Rows, load, rows_of, size, store
+
+
+class ProgramKind(IntEnum):
+    """Kinds of program."""
+
+    CONSTANT = 0
+    SINUSOID = 1
+    IMPULSE = 2
+    TABLE = 3
+
+
+_CONSTANT, _SINUSOID, _IMPULSE = (
+    ProgramKind.CONSTANT.value,
+    ProgramKind.SINUSOID.value,
+    ProgramKind.IMPULSE.value,
+)
+
+
+class Program(NamedTuple):
+    """A program by a value of :class:`ProgramKind` and its numbers, zero where it has fewer.
+
+    v, u of :class:`Constant`; v, u_mean, u_amplitude, omega of :class:`Sinusoid`; v, u_amplitude, t_centre,
+    t_width of :class:`Impulse`; none of :class:`Table`, which has rows.
+    """
+
+    kind: int
+    p0: float
+    p1: float
+    p2: float
+    p3: float
+
+
+class TableRow(NamedTuple):
+    """Speed v [m/s] and turn rate u [rad/s] at time t [s]."""
+
+    t: float
+    v: float
+    u: float
+
+
+@kernel
+def driven(program: Program, table: Rows[TableRow], t: float) -> Motion:
+    """What a program drives at time t [s]; ``table``: its rows, at least one if it is a table."""
+    if program.kind == _SINUSOID:
+        return _waved(program.p0, program.p1, program.p2, program.p3, t)
+    if program.kind == _IMPULSE:
+        return _swerved(program.p0, program.p1, program.p2, program.p3, t)
+    if program.kind == _CONSTANT:
+        return Motion(program.p0, program.p1)
+    return _interpolated(table, t)
+
+
+@kernel
+def _waved(v: float, u_mean: float, u_amplitude: float, omega: float, t: float) -> Motion:
+    return Motion(v, u_mean + u_amplitude * math.sin(omega * t))
+
+
+@kernel
+def _swerved(v: float, u_amplitude: float, t_centre: float, t_width: float, t: float) -> Motion:
+    widths = (t - t_centre) / t_width
+    return Motion(v, u_amplitude * math.exp(-0.5 * widths * widths))
+
+
+@kernel
+def _interpolated(table: Rows[TableRow], t: float) -> Motion:
+    """Linear between rows, held outside."""
+    low, after = 0, size(table)
+    while low < after:
+        middle = (low + after) // 2
+        if load(TableRow, table, middle).t <= t:
+            low = middle + 1
+        else:
+            after = middle
+    last = load(TableRow, table, min(after, size(table) - 1))
+    if after == 0 or after == size(table):
+        return Motion(last.v, last.u)
+    first = load(TableRow, table, after - 1)
+    share = (t - first.t) / (last.t - first.t)
+    return Motion((1.0 - share) * first.v + share * last.v, (1.0 - share) * first.u + share * last.u)
 
 
 class LeaderProgram(Protocol):
@@ -66,7 +151,7 @@ class Sinusoid:
 
     def __call__(self, t: float) -> Motion:
         """Motion at time t."""
-        return Motion(self.v, self.u_mean + self.u_amplitude * math.sin(self.omega * t))
+        return _waved(self.v, self.u_mean, self.u_amplitude, self.omega, t)
 
     @property
     def period(self) -> float | None:
@@ -94,8 +179,7 @@ class Impulse:
 
     def __call__(self, t: float) -> Motion:
         """Motion at time t."""
-        widths = (t - self.t_centre) / self.t_width
-        return Motion(self.v, self.u_amplitude * math.exp(-0.5 * widths * widths))
+        return _swerved(self.v, self.u_amplitude, self.t_centre, self.t_width, t)
 
     @property
     def period(self) -> float | None:
@@ -119,6 +203,7 @@ class Table:
     t: Sequence[float]
     v: Sequence[float]
     u: Sequence[float]
+    _rows: list[TableRow] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         columns = {name: tuple(map(float, getattr(self, name))) for name in ("t", "v", "u")}
@@ -135,20 +220,11 @@ class Table:
                 raise ValueError(
                     f"table has t[{row}] = {self.t[row]} after {self.t[row - 1]}, expected increasing times"
                 )
+        object.__setattr__(self, "_rows", list(map(TableRow, self.t, self.v, self.u)))
 
     def __call__(self, t: float) -> Motion:
         """Motion at time t, interpolated."""
-        after = bisect_right(self.t, t)
-        if after == 0:
-            return Motion(self.v[0], self.u[0])
-        before = after - 1
-        if after == len(self.t):
-            return Motion(self.v[before], self.u[before])
-        share = (t - self.t[before]) / (self.t[after] - self.t[before])
-        return Motion(
-            (1.0 - share) * self.v[before] + share * self.v[after],
-            (1.0 - share) * self.u[before] + share * self.u[after],
-        )
+        return _interpolated(cast("Rows[TableRow]", self._rows), t)
 
     @property
     def period(self) -> float | None:
@@ -159,3 +235,24 @@ class Table:
     def longest_step(self) -> float:
         """Shortest interval of the table; no limit for a table of one row."""
         return min((b - a for a, b in zip(self.t, self.t[1:], strict=False)), default=math.inf)
+
+
+def encoded(program: LeaderProgram) -> tuple[Program, Rows[TableRow]]:
+    """A program as compiled code takes it, and the rows of its table, none for another kind.
+
+    Raises :class:`ValueError` for a class that is none of this module's.
+    """
+    nothing = rows_of(TableRow, 0)
+    match program:
+        case Constant(v, u):
+            return Program(ProgramKind.CONSTANT.value, v, u, 0.0, 0.0), nothing
+        case Sinusoid(v, u_mean, u_amplitude, omega):
+            return Program(ProgramKind.SINUSOID.value, v, u_mean, u_amplitude, omega), nothing
+        case Impulse(v, u_amplitude, t_centre, t_width):
+            return Program(ProgramKind.IMPULSE.value, v, u_amplitude, t_centre, t_width), nothing
+        case Table(t, v, u):
+            rows = rows_of(TableRow, len(t))
+            for k, row in enumerate(zip(t, v, u, strict=True)):
+                store(rows, k, TableRow(*row))
+            return Program(ProgramKind.TABLE.value, 0.0, 0.0, 0.0, 0.0), rows
+    raise ValueError(f"{type(program).__name__} is no kind of program that compiled code can be given")

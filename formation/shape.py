@@ -8,17 +8,17 @@ the follower abreast on the right of the leader, alpha1 = -pi/2 and alpha2 = +pi
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
-from formation.angles import wrap
+from formation.angles import wrapped
+from formation.kernel import kernel
 from formation.pose import Motion, Pose
 
 ABREAST_ALPHA1 = -0.5 * math.pi
 ABREAST_ALPHA2 = 0.5 * math.pi
 
 
-@dataclass(frozen=True, slots=True)
-class Shape:
+class Shape(NamedTuple):
     """Distance rho [m] and bearings alpha1, alpha2 [rad] (Eq. (2) of the paper)."""
 
     rho: float
@@ -26,8 +26,7 @@ class Shape:
     alpha2: float
 
 
-@dataclass(frozen=True, slots=True)
-class ShapeRates:
+class ShapeRates(NamedTuple):
     """Time derivatives of a :class:`Shape`: rho_dot [m/s], alpha1_dot and alpha2_dot [rad/s]."""
 
     rho_dot: float
@@ -37,27 +36,36 @@ class ShapeRates:
 
 def shape_of(leader: Pose, follower: Pose) -> Shape:
     """Shape of the pair, bearings wrapped. Two robots in one place have none: :class:`ValueError`."""
-    dx, dy = follower.x - leader.x, follower.y - leader.y
-    rho = math.hypot(dx, dy)
-    if rho == 0.0:
+    shape = shape_between(leader, follower)
+    if shape.rho == 0.0:
         raise ValueError(
             f"leader and follower are both at ({leader.x}, {leader.y}); bearings need a distance"
         )
-    alpha1 = wrap(math.atan2(dy, dx) - leader.theta)
-    alpha2 = wrap(math.atan2(-dy, -dx) - follower.theta)
+    return shape
+
+
+@kernel
+def shape_between(leader: Pose, follower: Pose) -> Shape:
+    """Shape of the pair, bearings wrapped. In one place rho is 0, and the bearings mean nothing."""
+    dx, dy = follower.x - leader.x, follower.y - leader.y
+    rho = math.sqrt(dx * dx + dy * dy)
+    alpha1 = wrapped(math.atan2(dy, dx) - leader.theta)
+    alpha2 = wrapped(math.atan2(-dy, -dx) - follower.theta)
     return Shape(rho, alpha1, alpha2)
 
 
+@kernel
 def follower_pose(shape: Shape, leader: Pose) -> Pose:
     """Pose of the follower that stands in ``shape`` to ``leader``: the inverse of :func:`shape_of`."""
     line = leader.theta + shape.alpha1
     return Pose(
         leader.x + shape.rho * math.cos(line),
         leader.y + shape.rho * math.sin(line),
-        wrap(line + math.pi - shape.alpha2),
+        wrapped(line + math.pi - shape.alpha2),
     )
 
 
+@kernel
 def shape_rates(shape: Shape, leader: Motion, follower: Motion) -> ShapeRates:
     """Shape dynamics, Eq. (3) of the paper, for the motions of both robots. Needs rho > 0."""
     line_rate = (leader.v * math.sin(shape.alpha1) + follower.v * math.sin(shape.alpha2)) / shape.rho
@@ -68,6 +76,7 @@ def shape_rates(shape: Shape, leader: Motion, follower: Motion) -> ShapeRates:
     )
 
 
+@kernel
 def leader_velocity(
     rho: float, alpha2: float, rho_dot: float, alpha2_dot: float, follower: Motion
 ) -> tuple[float, float]:
@@ -82,10 +91,11 @@ def leader_velocity(
     return x, y
 
 
+@kernel
 def polar_velocity(x: float, y: float) -> tuple[float, float]:
     """(v1, alpha1) from (X, Y), Eq. (7) of the paper with ``atan2`` in the place of ``arctan``.
 
     The desired alpha1 = -pi/2 lies at X = 0, where arctan(Y/X) jumps by pi; atan2 is smooth there. A leader
     that stands still has no direction: it gives v1 = 0 and an alpha1 without meaning.
     """
-    return math.hypot(x, y), wrap(math.atan2(y, x))
+    return math.sqrt(x * x + y * y), wrapped(math.atan2(y, x))

@@ -7,10 +7,33 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from formation.angles import FloatArray
+from formation.kernel import kernel
+from formation.line import Line, line_of
 from formation.shape import Shape
 from formation.station import ABREAST, Station
 
 Number = TypeVar("Number", float, FloatArray)
+
+
+@kernel
+def restoring(rho: Number, rho_0: float, mu_rho: float) -> Number:
+    """Restoring term f(rho) [1/m] of Sec. IV-A of the paper. Needs rho > 0."""
+    # Factored, so that the zero at rho_0 is exact and its surroundings lose no digits.
+    return mu_rho * ((rho - rho_0) / rho) * ((rho + rho_0) / rho)
+
+
+@kernel
+def potential(rho: Number, rho_0: float, mu_rho: float) -> Number:
+    """Potential g(rho), whose derivative f is. Needs rho > 0."""
+    offset = rho - rho_0
+    return mu_rho * offset * (offset / rho)
+
+
+@kernel
+def restoring_slope(rho: Number, rho_0: float, mu_rho: float) -> Number:
+    """Slope f'(rho) [1/m^2]. Needs rho > 0."""
+    ratio = rho_0 / rho
+    return 2.0 * mu_rho * ratio * ratio / rho
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +56,7 @@ class Spacing:
 
     def f(self, rho: Number) -> Number:
         """Restoring term f [1/m]: negative when too close, positive when too far."""
-        # Factored, so that the zero at rho_0 is exact and its surroundings lose no digits.
-        return self.mu_rho * ((rho - self.rho_0) / rho) * ((rho + self.rho_0) / rho)
+        return restoring(rho, self.rho_0, self.mu_rho)
 
     def distance(self, pull: float) -> float:
         """Distance [m] at which f has the value ``pull`` [1/m], below mu_rho: the inverse of f.
@@ -46,13 +68,11 @@ class Spacing:
 
     def g(self, rho: Number) -> Number:
         """Potential g >= 0, without unit: g' = f, zero at rho_0 only, infinite at 0 and at infinity."""
-        offset = rho - self.rho_0
-        return self.mu_rho * offset * (offset / rho)
+        return potential(rho, self.rho_0, self.mu_rho)
 
     def f_prime(self, rho: Number) -> Number:
         """Slope of f [1/m^2]; positive everywhere."""
-        ratio = self.rho_0 / rho
-        return 2.0 * self.mu_rho * ratio * ratio / rho
+        return restoring_slope(rho, self.rho_0, self.mu_rho)
 
 
 def lyapunov(shape: Shape, spacing: Spacing, station: Station = ABREAST) -> float:
@@ -61,5 +81,11 @@ def lyapunov(shape: Shape, spacing: Spacing, station: Station = ABREAST) -> floa
     V1 < 2 is the region of attraction that the proof covers; the true one is larger. For another station
     1 - cos of the angle by which alpha1 is off, and g weighted with the sine of the bearing.
     """
-    aligned = math.cos(shape.alpha1) * station.cos + math.sin(shape.alpha1) * station.sin
-    return 1.0 + aligned + abs(station.sin) * spacing.g(shape.rho)
+    return lyapunov_at(line_of(shape), station.cos, station.sin, spacing.rho_0, spacing.mu_rho)
+
+
+@kernel
+def lyapunov_at(line: Line, cos_b: float, sin_b: float, rho_0: float, mu_rho: float) -> float:
+    """The same of a line, for the station of cosine and sine ``cos_b``, ``sin_b``."""
+    aligned = line.cos1 * cos_b + line.sin1 * sin_b
+    return 1.0 + aligned + abs(sin_b) * potential(line.rho, rho_0, mu_rho)

@@ -21,6 +21,16 @@ class Side(Enum):
         """The opposite side."""
         return Side.LEFT if self is Side.RIGHT else Side.RIGHT
 
+    @property
+    def sign(self) -> float:
+        """+1 on the right, -1 on the left: how kernels know a side."""
+        return 1.0 if self is Side.RIGHT else -1.0
+
+    @staticmethod
+    def of(sign: float) -> Side:
+        """Side of a sign."""
+        return Side.RIGHT if sign > 0.0 else Side.LEFT
+
 
 @dataclass(frozen=True, slots=True)
 class Station:
@@ -44,7 +54,7 @@ class Station:
     def __post_init__(self) -> None:
         if not 0.0 < self.bearing < math.pi:
             raise ValueError(f"bearing is {self.bearing}, expected an angle between 0 and pi")
-        sign = 1.0 if self.side is Side.RIGHT else -1.0
+        sign = self.side.sign
         cos = 0.0 if self.bearing == ABREAST_ALPHA2 else math.cos(self.bearing)
         for name, value in (("sign", sign), ("cos", cos), ("sin", sign * math.sin(self.bearing))):
             object.__setattr__(self, name, value)

@@ -8,7 +8,7 @@ from estimation.filters.belief import Belief, Model, innovation
 from estimation.filters.filter import Kind, Stepped, filter_of
 from estimation.filters.gaussian import Gaussian
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits
-from estimation.models.measurement import Measurement
+from estimation.models.measurement import FrontEnd, Measurement
 
 
 class MatrixStep(NamedTuple):
@@ -82,6 +82,7 @@ class Interpreted:
     def __init__(self, estimator: Estimator) -> None:
         self.estimator = estimator
         self.limits: LeaderLimits = estimator.model.limits
+        self.in_world = estimator.model.front_end is FrontEnd.WORLD
 
     @property
     def model(self) -> Model:

@@ -27,7 +27,7 @@ _LEAST_SCALE = 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class Watch:
+class OdometryWatch:
     """What alignment rests on, thinned: poses (capture_ns, pose) and samples of odometry.
 
     ``found``: what it let know last; ``applied``: what odometry is corrected by.
@@ -40,10 +40,10 @@ class Watch:
     next_ns: int = 0
 
 
-NOTHING_SEEN = Watch()
+NOTHING_SEEN = OdometryWatch()
 
 
-def with_pose(watch: Watch, capture_ns: int, pose: Pose) -> Watch:
+def with_pose(watch: OdometryWatch, capture_ns: int, pose: Pose) -> OdometryWatch:
     """Watch with a mocap pose of the follower, if it is new and not too close to the one before."""
     poses = watch.poses
     if poses and capture_ns < poses[-1][0] + _THINNED_NS:
@@ -54,7 +54,7 @@ def with_pose(watch: Watch, capture_ns: int, pose: Pose) -> Watch:
     return replace(watch, poses=(*poses[first:], (capture_ns, pose)))
 
 
-def with_sample(watch: Watch, sample: MotionSample) -> Watch:
+def with_sample(watch: OdometryWatch, sample: MotionSample) -> OdometryWatch:
     """Watch with a sample of odometry, if it is new and not too close to the one before."""
     samples = watch.samples
     if samples and sample.stamp_ns < samples[-1].stamp_ns + _THINNED_NS:
@@ -65,7 +65,7 @@ def with_sample(watch: Watch, sample: MotionSample) -> Watch:
     return replace(watch, samples=(*samples[first:], sample))
 
 
-def reconsidered(watch: Watch, now_ns: int) -> Watch:
+def reconsidered(watch: OdometryWatch, now_ns: int) -> OdometryWatch:
     """Watch after a look at what it holds, once a second.
 
     A correction begins where the odometry is off by more than 20 ms or 2 % and by four standard deviations,

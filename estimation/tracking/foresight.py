@@ -22,57 +22,66 @@ slope's lag: 5/6 w D of the error before, in quadrature to it, or 25/36 V / S of
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
+
+from formation.kernel import kernel
 
 _NS = 1e-9
 _LEFT_OF_HEADING = 25.0 / 36.0
 _ERRORS_TOGETHER = 1.5
 
 
-@dataclass(frozen=True, slots=True)
-class TurnTrend:
+class TurnTrend(NamedTuple):
     """What was heard of the leader's turn rate: the newest estimate, its variance, and a low-pass of all.
 
-    ``capture_ns`` of the newest; ``u1`` and ``slow`` in rad/s, ``variance`` in rad^2/s^2.
+    ``known``: whether any was; ``capture_ns`` of the newest; ``u1`` and ``slow`` in rad/s, ``variance`` in
+    rad^2/s^2.
     """
 
+    known: bool
     capture_ns: int
     u1: float
     variance: float
     slow: float
 
 
-@dataclass(frozen=True, slots=True)
-class Foresight:
+NO_TREND = TurnTrend(False, 0, 0.0, 0.0, 0.0)
+
+
+class Foresight(NamedTuple):
     """What is known of the leader's steering: |u1| <= k_u [rad/s], and diffusion [rad^2/s^3] of u1.
 
-    Raises :class:`ValueError` unless both are positive and finite.
+    ``spread``: variance S [rad^2/s^2] of u1 before anything is seen. Made by :meth:`of`.
     """
 
     k_u: float
     diffusion: float
+    spread: float
 
-    def __post_init__(self) -> None:
-        for name, value in (("k_u", self.k_u), ("diffusion", self.diffusion)):
+    @staticmethod
+    def of(k_u: float, diffusion: float) -> Foresight:
+        """Foresight with the spread of sinusoidal steering to the limit.
+
+        Raises :class:`ValueError` unless both numbers are positive and finite.
+        """
+        for name, value in (("k_u", k_u), ("diffusion", diffusion)):
             if not (value > 0.0 and math.isfinite(value)):
                 raise ValueError(f"{name} is {value}, expected a positive finite number")
+        return Foresight(k_u, diffusion, 0.5 * k_u * k_u)
 
-    @property
-    def spread(self) -> float:
-        """Variance S [rad^2/s^2] of u1 before anything is seen: that of sinusoidal steering to the limit."""
-        return 0.5 * self.k_u * self.k_u
-
+    @kernel
     def heard(
-        self, before: TurnTrend | None, capture_ns: int, u1: float, variance: float, ahead: float
+        self, before: TurnTrend, capture_ns: int, u1: float, variance: float, ahead: float
     ) -> TurnTrend:
         """Trend with one more estimate in it; its capture lies ``ahead`` [s] before the command acts."""
-        if before is None:
-            return TurnTrend(capture_ns, u1, variance, u1)
+        if not before.known:
+            return TurnTrend(True, capture_ns, u1, variance, u1)
         since = max(0, capture_ns - before.capture_ns) * _NS
-        window = 0.5 * self._behind(variance, ahead)
+        window = 0.5 * behind(self, variance, ahead)
         share = -math.expm1(-since / window) if window > 0.0 else 1.0
-        return TurnTrend(capture_ns, u1, variance, before.slow + share * (u1 - before.slow))
+        return TurnTrend(True, capture_ns, u1, variance, before.slow + share * (u1 - before.slow))
 
+    @kernel
     def predicted(self, trend: TurnTrend) -> float:
         """Turn rate [rad/s] when the command acts, within the leader's limit.
 
@@ -80,6 +89,7 @@ class Foresight:
         """
         return max(-self.k_u, min(self.k_u, trend.u1 + 2.0 * (trend.u1 - trend.slow)))
 
+    @kernel
     def further(self, trend: TurnTrend, ahead: float) -> float:
         """Angle [rad] by which the leader will have turned further than its estimated u1, held, turns it.
 
@@ -88,9 +98,10 @@ class Foresight:
         nothing where the expansion has ended, so that estimates that say little are predicted as they are.
         There is no cut at k_u: it would take noise off one side only and lean towards smaller turns.
         """
-        share = max(0.0, 1.0 - _LEFT_OF_HEADING * self._held(trend.variance, ahead) / self.spread)
-        return share * (trend.u1 - trend.slow) * self._behind(trend.variance, ahead)
+        share = max(0.0, 1.0 - _LEFT_OF_HEADING * held(self, trend.variance, ahead) / self.spread)
+        return share * (trend.u1 - trend.slow) * behind(self, trend.variance, ahead)
 
+    @kernel
     def weight(self, variance: float, ahead: float) -> float:
         """Share of the prediction to feed forward, in [0, 1]; the rest is left to the feedback.
 
@@ -102,11 +113,17 @@ class Foresight:
         that of u1, so that E counts (1 + mu1 D / 2)^2 times. Taken is 1.5 for all, its value for mu1 = 1.5
         per second and D = 0.3 s.
         """
-        doubt = self._held(variance, ahead) / self.spread
+        doubt = held(self, variance, ahead) / self.spread
         return max(0.0, 1.0 - _ERRORS_TOGETHER * doubt * doubt)
 
-    def _held(self, variance: float, ahead: float) -> float:
-        return variance + self.diffusion * ahead
 
-    def _behind(self, variance: float, ahead: float) -> float:
-        return self._held(variance, ahead) / self.diffusion
+@kernel
+def held(foresight: Foresight, variance: float, ahead: float) -> float:
+    """Variance V [rad^2/s^2] of an estimate of u1 that is held for ``ahead`` [s]."""
+    return variance + foresight.diffusion * ahead
+
+
+@kernel
+def behind(foresight: Foresight, variance: float, ahead: float) -> float:
+    """Time D [s] by which it is behind then."""
+    return held(foresight, variance, ahead) / foresight.diffusion

@@ -1,25 +1,25 @@
 """An emulated motion capture: noise that grows with motion, latency, jitter and loss.
 
-All randomness is drawn from a counter-based generator by (seed, stream, index), so that it does not depend on
+All randomness is drawn from a counter-based generator by (seed, stream, block), so that it does not depend on
 the order in which things are asked for.
 """
 
 from __future__ import annotations
 
-import functools
 import math
-from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
-from formation.angles import FloatArray, wrap
-from formation.pose import Motion, Pose
+from formation.angles import FloatArray, wrapped
+from formation.kernel import kernel
+from formation.pose import Pose
+from hil.emulator.robot import Robot
 
 _FULL_NOISE_SPEED = 0.05
 _FULL_NOISE_TURN = 0.2
 _NS = 1e-9
-_KEPT_BLOCKS = 64  # one of every stream of a long chain, so that none is drawn again and again
 
 
 class Stream(IntEnum):
@@ -30,13 +30,7 @@ class Stream(IntEnum):
     FOLLOWER_ODOMETRY = 2
 
 
-def block_length(stream: int) -> int:
-    """Items of a stream drawn at once: about what half a minute has, as a generator is slow to set up."""
-    return 4096 if stream == Stream.MOCAP else 1024
-
-
-@dataclass(frozen=True, slots=True)
-class MocapNoise:
+class MocapNoise(NamedTuple):
     """Noise of a moving body per axis [m] and in heading [rad]; ``static_fraction`` of it at rest."""
 
     sigma_position: float
@@ -44,77 +38,112 @@ class MocapNoise:
     static_fraction: float
 
 
-@dataclass(frozen=True, slots=True)
-class Delivery:
+class BodyNormals(NamedTuple):
+    """Standard normals behind the noise of one body in one frame."""
+
+    x: float
+    y: float
+    heading: float
+
+
+class Shares(NamedTuple):
+    """Uniform numbers from 0 to 1, that excluded, behind a frame's delay and its loss."""
+
+    late: float
+    lost: float
+
+
+class SeenPose(NamedTuple):
+    """What a frame says of a body, z up: position [m], and of its quaternion z and w; x and y are zero."""
+
+    x: float
+    y: float
+    qz: float
+    qw: float
+
+
+class Delivery(NamedTuple):
     """How frames travel: latency and jitter (mean of its exponential part) [s], share lost."""
 
     latency: float
     jitter: float
     loss: float
 
+    @kernel
+    def time_on_the_way(self, shares: Shares) -> float:
+        """How long a frame is on its way [s]."""
+        return self.latency - self.jitter * math.log1p(-shares.late)
 
-@dataclass(frozen=True, slots=True)
-class CaptureClock:
+    @kernel
+    def loses(self, shares: Shares) -> bool:
+        """Whether a frame never arrives."""
+        return shares.lost < self.loss
+
+
+class CaptureClock(NamedTuple):
     """The motion capture's own clock: ahead of the host's by ``offset`` [s], faster by ``drift`` (a share).
 
     It jumps by ``jump`` [s] when the leader has been driving for ``jump_at`` [s].
     """
 
-    offset: float = 0.0
-    drift: float = 0.0
-    jump: float = 0.0
-    jump_at: float = 0.0
+    offset: float
+    drift: float
+    jump: float
+    jump_at: float
 
-    def stamp_ns(self, at_ns: int, begun_ns: int, motion_since_ns: int | None) -> int:
-        """What it shows at a host time, in a run that began, and whose leader set off, at the given ones."""
+    @kernel
+    def reading_ns(self, at_ns: int, begun_ns: int, motion_since_ns: int) -> int:
+        """What it shows at a host time, in a run that began, and whose leader set off, at the given ones.
+
+        ``motion_since_ns`` is negative before the leader has set off.
+        """
         ahead = self.offset + self.drift * (at_ns - begun_ns) * _NS
-        if motion_since_ns is not None and (at_ns - motion_since_ns) * _NS >= self.jump_at:
-            ahead += self.jump
-        return at_ns + round(ahead / _NS)
+        if motion_since_ns >= 0 and (at_ns - motion_since_ns) * _NS >= self.jump_at:
+            ahead = ahead + self.jump
+        return at_ns + whole_ns(ahead)
 
 
-@dataclass(frozen=True, slots=True)
-class Draw:
-    """Random numbers of one frame: three standard normals per body, delay [s], and whether it is lost."""
-
-    bodies: tuple[tuple[float, ...], ...]
-    delay: float
-    lost: bool
+@kernel
+def whole_ns(seconds: float) -> int:
+    """A time in whole nanoseconds; halves go up."""
+    return math.floor(seconds / _NS + 0.5)
 
 
-def normals(seed: int, stream: int, index: int, count: int) -> tuple[float, ...]:
-    """``count`` standard normals for the ``index``-th item of a stream."""
-    block, row = divmod(index, block_length(stream))
-    return tuple(_kept(seed, stream, block, count)[0][row].tolist())
+@kernel
+def observe(robot: Robot, noise: MocapNoise, normal: BodyNormals) -> Pose:
+    """Pose as mocap sees it: the noise rises from its static share to full with the body's motion."""
+    v, u = robot.motion.v / _FULL_NOISE_SPEED, robot.motion.u / _FULL_NOISE_TURN
+    activity = min(1.0, math.sqrt(v * v + u * u))
+    scale = noise.static_fraction + (1.0 - noise.static_fraction) * activity
+    return Pose(
+        robot.at.x + scale * noise.sigma_position * normal.x,
+        robot.at.y + scale * noise.sigma_position * normal.y,
+        wrapped(robot.heading + scale * noise.sigma_heading * normal.heading),
+    )
 
 
-def draw_frame(seed: int, index: int, delivery: Delivery, bodies: int = 2) -> Draw:
-    """Random numbers of a mocap frame."""
-    block, row = divmod(index, block_length(Stream.MOCAP))
-    rows, shares = _kept(seed, Stream.MOCAP, block, 3 * bodies)
-    normal, (late, lost) = tuple(rows[row].tolist()), shares[row].tolist()
-    delay = delivery.latency - delivery.jitter * math.log1p(-late)
-    each = tuple(normal[first : first + 3] for first in range(0, 3 * bodies, 3))
-    return Draw(each, delay, lost < delivery.loss)
+@kernel
+def seen_pose(pose: Pose) -> SeenPose:
+    """A pose as a frame, or odometry, tells it."""
+    half = 0.5 * pose.theta
+    return SeenPose(pose.x, pose.y, math.sin(half), math.cos(half))
+
+
+def block_length(stream: int) -> int:
+    """Items of a stream drawn at once: about what half a minute has, as a generator is slow to set up."""
+    return 4096 if stream == Stream.MOCAP else 1024
 
 
 def draw_block(seed: int, stream: int, block: int, count: int) -> tuple[FloatArray, FloatArray]:
     """Normals (n, count) of the n = :func:`block_length` items of a block, and for frames uniforms (n, 2)."""
-    random = np.random.Generator(np.random.Philox(key=[seed, int(stream)], counter=[0, 0, 0, block]))
     n = block_length(stream)
-    normal = random.standard_normal((n, count))
-    return normal, random.random((n if stream == Stream.MOCAP else 0, 2))
+    normal, shares = np.empty((n, count)), np.empty((n if stream == Stream.MOCAP else 0, 2))
+    draw_into(normal, shares, seed, stream, block)
+    return normal, shares
 
 
-_kept = functools.lru_cache(maxsize=_KEPT_BLOCKS)(draw_block)
-
-
-def observe(pose: Pose, motion: Motion, noise: MocapNoise, normal: tuple[float, ...]) -> Pose:
-    """Pose as mocap sees it: the noise rises from its static share to full with the body's motion."""
-    activity = min(1.0, math.hypot(motion.v / _FULL_NOISE_SPEED, motion.u / _FULL_NOISE_TURN))
-    scale = noise.static_fraction + (1.0 - noise.static_fraction) * activity
-    return Pose(
-        pose.x + scale * noise.sigma_position * normal[0],
-        pose.y + scale * noise.sigma_position * normal[1],
-        wrap(pose.theta + scale * noise.sigma_heading * normal[2]),
-    )
+def draw_into(normal: FloatArray, shares: FloatArray, seed: int, stream: int, block: int) -> None:
+    """Fill arrays with a block's numbers from the first on: standard normals, then uniform ones."""
+    random = np.random.Generator(np.random.Philox(key=[seed, int(stream)], counter=[0, 0, 0, block]))
+    random.standard_normal(out=normal)
+    random.random(out=shares)

@@ -6,7 +6,6 @@ run has one, recorder have reported that they are well, and a command has reache
 
 from __future__ import annotations
 
-from bisect import insort
 from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
@@ -14,24 +13,15 @@ from itertools import pairwise
 from msgspec import Struct, field
 from msgspec.structs import replace
 
-from formation.pose import STANDSTILL, Motion, Pose
-from hil.emulator.faults import Pair, faulty
-from hil.emulator.lab_messages import frame_message, odometry_message, truth_message
-from hil.emulator.mocap import (
-    CaptureClock,
-    Delivery,
-    Draw,
-    MocapNoise,
-    Stream,
-    draw_frame,
-    normals,
-    observe,
-)
-from hil.emulator.robot import Actuators, Robot, drive
+from formation.pose import STANDSTILL
+from hil.emulator.lab_messages import seen_message, told_message, truth_message
+from hil.emulator.mocap import whole_ns
+from hil.emulator.plant import Plant
+from hil.emulator.robot import Robot
+from hil.emulator.world import CAPTURE, FRAME, NOTHING, SAMPLE, Happened
 from hil.nodes.node import Counts, Outgoing, counted, diagnostics, named_counts, no_counts, outgoing
 from hil.scenario.links import links_of, node_names
 from hil.scenario.ordered_sides import ordered_sides
-from hil.scenario.parts import leader_program
 from hil.scenario.schema import Scenario
 from hil.scenario.start import chain_poses
 from hil.wire import message_types as msg
@@ -47,29 +37,30 @@ _DIAGNOSTICS_NS = 500_000_000
 
 
 class EmulatorState(Struct, frozen=True):
-    """The world: all robots at ``time_ns``, the leader first, what is on its way, and what is due next.
+    """The lab, which changes in place, when its next thing is due, and what the node knows besides.
 
     ``alive``: nodes that have reported to be well. ``commanded``: followers that have had a command, by
-    their place. ``motion_since_ns``: when the leader set off, None before. ``pending``: captured frames, and
-    odometry that is told later, by release time. ``shown``: what the newest frame shows of every robot.
-    ``orders``: how many orders to change sides were given.
+    their place. ``orders``: how many orders to change sides were given.
     """
 
-    time_ns: int
-    begun_ns: int
-    robots: tuple[Robot, ...]
-    frames: int = 0
-    odometry: int = 0
-    lost: int = 0
-    pending: tuple[tuple[int, int, Outgoing], ...] = ()
+    plant: Plant
+    due_ns: int
     alive: frozenset[str] = frozenset()
     commanded: frozenset[int] = frozenset()
-    stopped: bool = False
-    motion_since_ns: int | None = None
     refused: Counts = field(default_factory=no_counts)
     next_diagnostics_ns: int = 0
-    shown: tuple[Pose, ...] = ()
     orders: int = 0
+
+    @property
+    def motion_since_ns(self) -> int | None:
+        """When the leader set off, None before."""
+        since_ns = self.plant.motion_since_ns
+        return None if since_ns < 0 else since_ns
+
+    @property
+    def robots(self) -> tuple[Robot, ...]:
+        """All robots as they are now, the leader first."""
+        return self.plant.robots()
 
 
 class EmulatorNode:
@@ -84,23 +75,14 @@ class EmulatorNode:
     def __init__(
         self, scenario: Scenario, needs: frozenset[str] = frozenset({"estimator", "controller"})
     ) -> None:
-        robot, mocap = scenario.robot, scenario.mocap
         self.scenario = scenario
         links = links_of(scenario)
         self.needs = frozenset(name for need in needs for name in node_names(need, links))
         self.pairs = [link_topics(link) for link in links]
         self.topics = self.pairs[0]
         self.names = (self.topics.leader, *(pair.follower for pair in self.pairs))
-        self.program = leader_program(scenario)
         self.poses = chain_poses(scenario, len(self.names))
-        self.actuators = Actuators(
-            robot.lag_s, robot.v_max, robot.u_max, robot.v_resolution, robot.u_resolution
-        )
-        self.noise = MocapNoise(mocap.sigma_position, mocap.sigma_heading, mocap.static_fraction)
-        self.delivery = Delivery(mocap.latency_s, mocap.jitter_s, mocap.loss)
-        self.clock = CaptureClock(
-            mocap.clock_offset_s, mocap.clock_drift_ppm * 1e-6, mocap.clock_jump_s, mocap.clock_jump_at_s
-        )
+        self.delayed = whole_ns(scenario.robot.odometry_delay_s) > 0
         self.orders = ordered_sides(scenario)
         self._handlers: dict[str, Callable[[EmulatorState, bytes, int], EmulatorState]] = {
             **{pair.cmd_vel: partial(self._on_command, k) for k, pair in enumerate(self.pairs, start=1)},
@@ -111,12 +93,12 @@ class EmulatorNode:
 
     def begin(self, now_ns: int) -> EmulatorState:
         """All robots stand at their start poses."""
-        return EmulatorState(now_ns, now_ns, tuple(map(Robot, self.poses)), next_diagnostics_ns=now_ns)
+        plant = Plant(self.scenario, self.poses, now_ns)
+        return EmulatorState(plant, now_ns, next_diagnostics_ns=now_ns)
 
     def due_ns(self, state: EmulatorState) -> int:
         """Time of the next capture, odometry sample, or release of a captured frame."""
-        due = min(self._capture_ns(state), self._odometry_ns(state))
-        return min(due, state.pending[0][0]) if state.pending else due
+        return state.due_ns
 
     def step(
         self, state: EmulatorState, event: Event, now_ns: int
@@ -136,131 +118,81 @@ class EmulatorNode:
             return replace(state, refused=counted(state.refused, "malformed")), out
 
     def _on_command(self, place: int, state: EmulatorState, payload: bytes, now_ns: int) -> EmulatorState:
-        wanted = STANDSTILL if state.stopped else read_drive(payload, stamped=self.topics.stamped)
-        state = self._move(state, now_ns)
-        return replace(
-            _with_command(state, place, self.actuators.accept(wanted)), commanded=state.commanded | {place}
-        )
+        stopped = state.plant.stopped
+        wanted = STANDSTILL if stopped else read_drive(payload, stamped=self.topics.stamped)
+        state.plant.command(place, wanted, now_ns)
+        if place in state.commanded:
+            return state
+        return self._readied(replace(state, commanded=state.commanded | {place}))
 
     def _on_stop(self, state: EmulatorState, payload: bytes, now_ns: int) -> EmulatorState:
-        state = self._move(state, now_ns)
-        robots = tuple(robot.told(STANDSTILL) for robot in state.robots)
-        return replace(state, stopped=True, robots=robots)
+        state.plant.halt(now_ns)
+        return state
 
     def _on_diagnostics(self, state: EmulatorState, payload: bytes, now_ns: int) -> EmulatorState:
         report = decode_as(payload, msg.DiagnosticArray)
         well = {status.name.removeprefix("abreast/") for status in report.status if status.level == 0}
-        return replace(state, alive=state.alive | (well & self.needs))
+        return self._readied(replace(state, alive=state.alive | (well & self.needs)))
+
+    def _readied(self, state: EmulatorState) -> EmulatorState:
+        """Open the start barrier once all are alive and commanded."""
+        if len(state.commanded) == len(self.pairs) and state.alive >= self.needs:
+            state.plant.let_go()
+        return state
 
     def _catch_up(self, state: EmulatorState, now_ns: int) -> tuple[EmulatorState, tuple[Outgoing, ...]]:
         """Do everything that was due until now, in the order in which it was."""
         out: list[Outgoing] = []
-        while (due_ns := self.due_ns(state)) <= now_ns:
-            if state.pending and state.pending[0][0] == due_ns:
-                out.append(state.pending[0][2])
-                state = replace(state, pending=state.pending[1:])
-            elif self._odometry_ns(state) == due_ns:
-                state = self._sample_odometry(self._move(state, due_ns), out)
+        while state.due_ns <= now_ns:
+            happened = state.plant.advance(now_ns)
+            if happened.kind == NOTHING:
+                break
+            state = replace(state, due_ns=happened.due_ns)
+            if happened.kind == CAPTURE:
+                state = self._tell_truth(state, happened, out)
+            elif happened.kind == FRAME:
+                out.append(self._frame(state.plant, happened))
             else:
-                state = self._capture(self._move(state, due_ns), out)
+                self._tell_odometry(state.plant, happened, out)
         return state, tuple(out)
 
-    def _move(self, state: EmulatorState, until_ns: int) -> EmulatorState:
-        dt = (until_ns - state.time_ns) * _NS
-        if dt <= 0.0:
-            return state
-        robots = tuple(drive(robot, self.actuators, dt) for robot in state.robots)
-        return replace(state, time_ns=until_ns, robots=robots)
-
-    def _capture(self, state: EmulatorState, out: list[Outgoing]) -> EmulatorState:
-        """Take a mocap frame, publish the truth, and let the leader's program go on."""
-        at_ns, number = state.time_ns, state.frames
-        state = self._lead(state, at_ns)
-        for pair, (leader, follower) in zip(self.pairs, pairwise(state.robots), strict=True):
+    def _tell_truth(self, state: EmulatorState, happened: Happened, out: list[Outgoing]) -> EmulatorState:
+        """Publish the truth of a capture, and what goes with it: an operator's order, a report."""
+        at_ns, number, since_ns = happened.at_ns, happened.number, state.plant.motion_since_ns
+        for pair, (leader, follower) in zip(self.pairs, pairwise(state.plant.robots()), strict=True):
             out.append(outgoing(pair.truth, truth_message(at_ns, number, leader, follower), at_ns))
-        state = self._order(state, out)
-        draw = draw_frame(self.scenario.run.seed, number, self.delivery, len(state.robots))
-        state = replace(state, frames=number + 1)
-        shown = () if draw.lost else self._shown(state, draw)
-        if not shown:
-            state = replace(state, lost=state.lost + 1)
-        else:
-            bodies = zip(self.names, shown, strict=True)
-            stamp_ns = self.clock.stamp_ns(at_ns, state.begun_ns, state.motion_since_ns)
-            frame = outgoing(topics.RIGID_BODIES, frame_message(stamp_ns, number, bodies), at_ns)
-            state = replace(state, shown=shown)
-            state = _with_pending(state, at_ns + round(draw.delay / _NS), number, frame)
-        if at_ns >= state.next_diagnostics_ns:
+        if self.orders and since_ns >= 0 and not state.plant.stopped:
+            state = self._order(state, (at_ns - since_ns) * _NS, at_ns, out)
+        if at_ns >= state.next_diagnostics_ns or at_ns == since_ns:
             out.append(self.report(state, at_ns))
             state = replace(state, next_diagnostics_ns=at_ns + _DIAGNOSTICS_NS)
         return state
 
-    def _shown(self, state: EmulatorState, draw: Draw) -> tuple[Pose, ...]:
-        """All bodies as the motion capture shows them now, faults included; empty for no frame at all."""
-        mocap = self.scenario.mocap
-        poses = tuple(
-            observe(robot.pose, robot.motion, self.noise, normal)
-            for robot, normal in zip(state.robots, draw.bodies, strict=True)
-        )
-        if not mocap.faults or state.motion_since_ns is None:
-            return poses
-        t = (state.time_ns - state.motion_since_ns) * _NS
-        last = Pair(*state.shown[:2]) if state.shown else None
-        pair = faulty(mocap.faults, t, 1.0 / mocap.rate_hz, Pair(*poses[:2]), last)
-        return () if pair is None else (pair.leader, pair.follower, *poses[2:])
-
-    def _lead(self, state: EmulatorState, at_ns: int) -> EmulatorState:
-        """Give the leader its next command; it sets off once all are alive."""
-        if state.stopped:
-            return state
-        since_ns = state.motion_since_ns
-        if since_ns is None:
-            if len(state.commanded) < len(self.pairs) or not state.alive >= self.needs:
-                return state
-            since_ns = at_ns
-            state = replace(state, motion_since_ns=at_ns, next_diagnostics_ns=at_ns)
-        command = self.actuators.accept(self.program((at_ns - since_ns) * _NS))
-        return _with_command(state, 0, command)
-
-    def _order(self, state: EmulatorState, out: list[Outgoing]) -> EmulatorState:
+    def _order(self, state: EmulatorState, t: float, at_ns: int, out: list[Outgoing]) -> EmulatorState:
         """Tell the follower to go to the other side when the scenario says so, as an operator would."""
-        if state.motion_since_ns is None or state.stopped:
-            return state
-        t = (state.time_ns - state.motion_since_ns) * _NS
         while state.orders < len(self.orders) and t >= self.orders[state.orders][0]:
             order = msg.String(data=self.orders[state.orders][1].value)
             state = replace(state, orders=state.orders + 1)
-            out.append(outgoing(self.topics.side, order, state.time_ns))
+            out.append(outgoing(self.topics.side, order, at_ns))
         return state
 
-    def _sample_odometry(self, state: EmulatorState, out: list[Outgoing]) -> EmulatorState:
-        number, at_ns, robot = state.odometry, state.time_ns, self.scenario.robot
-        for stream, (name, body) in enumerate(
-            zip(self.names, state.robots, strict=True), start=Stream.LEADER_ODOMETRY
-        ):
-            normal = normals(self.scenario.run.seed, stream, number, 2)
-            moving = 0.0 if body.motion == STANDSTILL else 1.0
-            measured = Motion(
-                robot.odometry_scale_v * body.motion.v + moving * robot.odometry_sigma_v * normal[0],
-                robot.odometry_scale_u * body.motion.u + moving * robot.odometry_sigma_u * normal[1],
+    def _frame(self, plant: Plant, happened: Happened) -> Outgoing:
+        bodies = zip(self.names, plant.seen(happened.slot), strict=True)
+        frame = seen_message(happened.stamp_ns, happened.number, bodies)
+        return outgoing(topics.RIGID_BODIES, frame, happened.at_ns)
+
+    def _tell_odometry(self, plant: Plant, happened: Happened, out: list[Outgoing]) -> None:
+        """Publish odometry that arrives, without delay at the sample itself, and what the leader drives."""
+        stamp_ns = happened.stamp_ns
+        if happened.kind != SAMPLE or not self.delayed:
+            for name, told in zip(self.names, plant.told(happened.slot), strict=True):
+                message = told_message(stamp_ns, name, told.pose, told.motion)
+                out.append(outgoing(f"{name}/odom", message, stamp_ns))
+        if happened.kind == SAMPLE:
+            drives = drive_message(
+                plant.robot(0).goal, stamp_ns, self.topics.leader, stamped=self.topics.stamped
             )
-            told_ns = at_ns + round(robot.odometry_delay_s / _NS)
-            message = outgoing(f"{name}/odom", odometry_message(told_ns, name, body.pose, measured), told_ns)
-            if told_ns == at_ns:
-                out.append(message)
-            else:
-                state = _with_pending(state, told_ns, number, message)
-        leader_drives = drive_message(
-            state.robots[0].command, at_ns, self.topics.leader, stamped=self.topics.stamped
-        )
-        out.append(outgoing(self.topics.leader_cmd_vel, leader_drives, at_ns))
-        return replace(state, odometry=number + 1)
-
-    def _capture_ns(self, state: EmulatorState) -> int:
-        return state.begun_ns + round(state.frames / self.scenario.mocap.rate_hz / _NS)
-
-    def _odometry_ns(self, state: EmulatorState) -> int:
-        return state.begun_ns + round(state.odometry / self.scenario.robot.odometry_rate_hz / _NS)
+            out.append(outgoing(self.topics.leader_cmd_vel, drives, stamp_ns))
 
     def report(self, state: EmulatorState, now_ns: int) -> Outgoing:
         """Diagnostics: what the start barrier still waits for, since when the leader moves, frames lost."""
@@ -274,19 +206,9 @@ class EmulatorNode:
                 if place not in state.commanded
             ]
         problem = f"waiting for {', '.join(missing)}" if missing else ""
-        values: dict[str, object] = {"stopped": state.stopped, "frames": state.frames, "lost": state.lost}
-        if state.motion_since_ns is not None:
-            values["motion_since_ns"] = state.motion_since_ns
+        world = state.plant.world()
+        values: dict[str, object] = {"stopped": world.stopped, "frames": world.frames, "lost": world.lost}
+        if world.motion_since_ns >= 0:
+            values["motion_since_ns"] = world.motion_since_ns
         values |= named_counts("refused", state.refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
-
-
-def _with_command(state: EmulatorState, place: int, command: Motion) -> EmulatorState:
-    robots = state.robots
-    return replace(state, robots=(*robots[:place], robots[place].told(command), *robots[place + 1 :]))
-
-
-def _with_pending(state: EmulatorState, release_ns: int, number: int, message: Outgoing) -> EmulatorState:
-    pending = list(state.pending)
-    insort(pending, (release_ns, number, message), key=lambda item: item[:2])
-    return replace(state, pending=tuple(pending))

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from estimation.consistency.cramer_rao import TruePath, cramer_rao
 from estimation.filters.belief import Model
 from estimation.models.measurement import FrontEnd, PoseNoise
-from estimation.models.motion import LeaderLimits, ProcessNoise
 from estimation.tracking.estimate import QUANTITIES
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray, wrap
 from hil.judge.columns import Columns, EstimateColumns, inside
 from hil.judge.evidence import Evidence, Span
 from hil.judge.true_states import Stamps, TrueStates
+from hil.scenario.leader_model import leader_limits, pose_noise, process_noise
 from hil.scenario.schema import Scenario
 
 WARM_UP_NS = 3_000_000_000
@@ -144,19 +144,17 @@ def _nearest(moments_ns: Stamps, wanted_ns: Stamps) -> NDArray[np.int64]:
 
 
 def _model(scenario: Scenario) -> Model:
-    limits = LeaderLimits(scenario.leader.v_eps, scenario.leader.k_v, scenario.leader.k_u)
-    return Model(
-        FrontEnd.WORLD,
-        limits,
-        ProcessNoise.by_rule(limits, scenario.estimator.turn_bandwidth, scenario.estimator.speed_bandwidth),
-    )
+    return Model(FrontEnd.WORLD, leader_limits(scenario), process_noise(scenario))
 
 
 def _noise(scenario: Scenario, *, emulated: bool) -> tuple[PoseNoise, float, float]:
     """Noise of poses, v2 and u2: what the emulator put in, elsewhere what the estimator assumes."""
     if emulated:
         mocap, robot = scenario.mocap, scenario.robot
-        pose_noise = PoseNoise(mocap.sigma_position, mocap.sigma_heading)
-        return pose_noise, robot.odometry_sigma_v, robot.odometry_sigma_u
+        return (
+            PoseNoise(mocap.sigma_position, mocap.sigma_heading),
+            robot.odometry_sigma_v,
+            robot.odometry_sigma_u,
+        )
     given = scenario.estimator
-    return PoseNoise(given.sigma_position, given.sigma_heading), given.sigma_v2, given.sigma_u2
+    return pose_noise(scenario), given.sigma_v2, given.sigma_u2

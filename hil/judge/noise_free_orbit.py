@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from controllers.laws import Gains
-from controllers.station_keeper import StationKeeper
+from controllers.station_keeper import StationKeeper, StationState
 from formation.angles import FloatArray, wrap
 from formation.pose import Motion
 from formation.shape import Shape, shape_rates
@@ -93,27 +92,27 @@ def _integrate(
 ) -> list[_State]:
     """States after every step, the first included; ``driven``: the leader's motion at every half step."""
     keeper = station_keeper(scenario)
-    keeping, states, waiting = keeper.begin(), [start], deque(orders)
+    station, states, waiting = keeper.begin(), [start], deque(orders)
     for k in range(0, len(driven) - 1, 2):
         while waiting and waiting[0][0] <= 0.5 * k * step:
-            keeping = keeper.told(keeping, waiting.popleft()[1]) or keeping
+            station = keeper.order(station, waiting.popleft()[1]) or station
         state, leader = states[-1], driven[k]
         held = None
-        if keeping.waits or not keeping.change.arrived:
-            keeping, wanted = keeper.drive(keeping, _shape(state), leader, leader.u, step)
-            held = None if keeping.change.arrived else keeper.limits.apply(wanted)[0]
-        rates = partial(_rates, keeper, replace(keeper.gains, station=keeping.change.station), held)
+        if station.waits or not station.change.arrived:
+            station, wanted = keeper.drive(station, _shape(state), leader, leader.u, step)
+            held = None if station.change.arrived else keeper.limits.apply(wanted)[0]
+        rates = partial(_rates, keeper, station, held)
         states.append(_stepped(rates, state, driven[k : k + 3], step))
     return states
 
 
 def _rates(
-    keeper: StationKeeper, at_station: Gains, held: Motion | None, state: _State, leader: Motion
+    keeper: StationKeeper, station: StationState, held: Motion | None, state: _State, leader: Motion
 ) -> _State:
-    """Rates under the law at a station, or under a motion that is held on the way to one."""
-    shape, within = _shape(state), keeper.limits
+    """Rates under the law at its station, or under a motion that is held on the way to one."""
+    shape = _shape(state)
     if held is None:
-        held, _ = within.apply(keeper.law(shape, leader.v, leader.u, at_station, within))
+        held, _ = keeper.limits.apply(keeper.by_law(station, shape, leader))
     change = shape_rates(shape, leader, held)
     return change.rho_dot / shape.rho, change.alpha1_dot, change.alpha2_dot
 

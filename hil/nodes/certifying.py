@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 from estimation.bounds.certified import Certain, Failed
@@ -10,8 +9,8 @@ from estimation.bounds.certified_positions import PositionCertifier
 from estimation.bounds.certified_sightings import SightingCertifier, SightingErrors, velocity_error
 from estimation.bounds.guarantees import leader_acceleration
 from estimation.bounds.recent import NOTHING_RECENT, Recent
-from estimation.models.measurement import Measurement
-from estimation.own_motion.inputs import History
+from estimation.own_motion.odometry_history import History
+from formation.pose import Pose
 from hil.errors import UsageError
 from hil.scenario.noise_bounds import NOISE_SIGMAS, position_bound
 from hil.scenario.schema import Scenario
@@ -43,17 +42,17 @@ class Certifying:
             delay = scenario.estimator.input_delay_s
             self.by_sightings = SightingCertifier(_errors(scenario), A, speeds, rho, v2, step, delay)
 
-    def heard(self, believed: Believed, measurement: Measurement) -> Believed:
-        """What is believed with one measurement more: a frame, or a sighting on the body front end."""
-        capture_ns, seen = measurement.capture_ns, measurement.seen
-        if seen is not None:
-            follower = (seen.follower.x, seen.follower.y)
-            frames = self.by_frames.add(believed.frames, capture_ns, seen.leader, follower)
-            return replace(believed, frames=frames)
+    def heard_frame(
+        self, believed: Believed, capture_ns: int, leader: tuple[float, float], follower: Pose
+    ) -> Believed:
+        """What is believed with one frame more."""
+        frames = self.by_frames.add(believed.frames, capture_ns, leader, (follower.x, follower.y))
+        return replace(believed, frames=frames)
+
+    def heard_sighting(self, believed: Believed, capture_ns: int, rho: float, alpha2: float) -> Believed:
+        """What is believed with one sighting more, on the body front end."""
         if self.by_sightings is None:
             return believed
-        x, y = measurement.position.tolist()
-        rho, alpha2 = math.hypot(x, y), math.atan2(y, x)
         return replace(believed, sightings=self.by_sightings.add(believed.sightings, capture_ns, rho, alpha2))
 
     def certain(self, believed: Believed, odometry: History, capture_ns: int) -> Certain | Failed:

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace as with_changes
+from typing import cast
 
 from msgspec import Struct, field
 from msgspec.structs import replace
 
-from controllers.guard import Decision, decide
-from controllers.resolution import NOTHING_OWED, Resolution
-from controllers.station_keeper import Keeping
-from estimation.tracking.estimate import Estimate
-from estimation.tracking.foresight import TurnTrend
-from estimation.tracking.prediction import SentCommand, predict_shape
+from controllers.follower import Command
+from controllers.station_keeper import StationState, at_station
+from estimation.tracking.estimate import QUANTITIES
+from estimation.tracking.prediction import Reported, SentCommand, Sight, rows_for
 from estimation.tracking.tracker import Status
 from formation.pose import Motion
+from formation.records import Rows, columns_of, load, row_of, rows_of
+from formation.ring import place
 from formation.station import Side
-from hil.nodes.leader_turn import LeaderTurn
+from hil.nodes.control_rules import control_rules
+from hil.nodes.controller_entries import NO_REPORT, ControlEvent, Happening, Outcome
+from hil.nodes.controller_entries import control as control_step
+from hil.nodes.controller_step import ControlState, begun
+from hil.nodes.leader_turn import SOURCES, TurnSource
 from hil.nodes.node import (
     Counts,
     Outgoing,
@@ -29,49 +32,62 @@ from hil.nodes.node import (
     no_counts,
     outgoing,
 )
-from hil.scenario.parts import limits, station_keeper
+from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.drive_message import drive_message, read_drive
 from hil.wire.estimate_message import from_message
 from hil.wire.events import Event
-from hil.wire.intake import CLOCK_TOLERANCE_NS
 from hil.wire.messages import MalformedPayloadError, decode_as, header, to_time
 from hil.wire.topics import topics_of
 
 NAME = "controller"
 _DIAGNOSTICS_NS = 500_000_000
-_NS = 1e-9
-_LARGEST = 1e6
-_SHORTEST_STEP_NS = 1_000_000
+_U1 = QUANTITIES.index("u1")
+_CAUSES = {Outcome.BAD_STAMP.value: "bad_stamp", Outcome.UNSAFE_ORDER.value: "unsafe_side_change"}
 
 
 class ControllerState(Struct, frozen=True):
     """All that the controller remembers.
 
-    ``estimate``: the newest one that may move the robot; ``status``: of the newest one of any kind.
-    ``sent``: commands since that estimate's capture, oldest first, and the one before. ``leader_u1``: the
-    turn rate that the leader was told to drive, kept for the law ``ideal``, nan before it is known.
-    ``trend``: of the estimated turn rate. ``keeping``: the side that was ordered. ``owed``: what rounding to
-    the robot's steps took off the last command, of ``commanded_ns``.
+    ``control`` (1,) and ``commands``, those on their way: rows that no step writes to, each has its own.
     """
 
-    keeping: Keeping
-    estimate: Estimate | None = None
-    status: Status = Status.INITIALISING
-    stopped: bool = False
-    sent: tuple[SentCommand, ...] = ()
-    owed: Motion = NOTHING_OWED
+    control: Rows[ControlState]
+    commands: Rows[SentCommand]
     receipts: tuple[msg.Consumed, ...] = ()
     refused: Counts = field(default_factory=no_counts)
     decided: Counts = field(default_factory=no_counts)
-    heard: bool = False
-    leader_u1: float = math.nan
-    trend: TurnTrend | None = None
-    commanded_ns: int = 0
-    next_tick_ns: int = 0
     next_diagnostics_ns: int = 0
+
+    @property
+    def known(self) -> ControlState:
+        """What is known of estimates, orders and the last command."""
+        return load(ControlState, self.control, 0)
+
+    @property
+    def stopped(self) -> bool:
+        """Whether a stop was ordered."""
+        return self.known.stopped
+
+    @property
+    def station(self) -> StationState:
+        """The side that was ordered, and where the follower is on its way there."""
+        return self.known.follower.station
+
+    @property
+    def estimate(self) -> Sight | None:
+        """The newest estimate that may move the robot."""
+        known = self.known
+        return known.sight if known.known else None
+
+    @property
+    def sent(self) -> tuple[SentCommand, ...]:
+        """Commands since the capture of that, oldest first, and the one before."""
+        sent = self.known.sent
+        places = [place(sent, self.commands, k) for k in range(sent.length)]
+        return tuple(load(SentCommand, self.commands, k) for k in places)
 
 
 class ControllerNode:
@@ -81,174 +97,91 @@ class ControllerNode:
     """
 
     def __init__(self, scenario: Scenario, name: str = NAME, *, may_change: bool = True) -> None:
-        given = scenario.controller
         self.name = name
         self.topics = topics_of(scenario)
-        self.keeper, self.limits = station_keeper(scenario), limits(scenario)
-        self.resolution = Resolution(given.v_resolution, given.u_resolution)
-        self.max_age = given.max_age_s
-        self.lag = given.lag_s
-        self.transport_ns = round(given.transport_s / _NS)
-        self.ahead_ns = self.transport_ns + round(given.lag_s / _NS)
-        self.tick_ns = round(1.0 / given.tick_hz / _NS)
-        self.leader_turn = LeaderTurn(scenario)
-        leader = (self.topics.leader_cmd_vel,) if self.leader_turn.is_told else ()
+        self.rules = row_of(control_rules(scenario))
+        self.station = station(scenario)
+        self.rows = rows_for(scenario.controller.max_age_s + scenario.controller.transport_s)
+        is_told = SOURCES[scenario.controller.law] is TurnSource.TOLD
+        leader = (self.topics.leader_cmd_vel,) if is_told else ()
         orders = (self.topics.side,) if may_change else ()
         self.subscribes: tuple[str, ...] = (self.topics.estimate, topics.STOP, *leader, *orders)
 
     def begin(self, now_ns: int) -> ControllerState:
         """State of a controller that has heard nothing: it keeps the robot still."""
-        return ControllerState(self.keeper.begin(), next_tick_ns=now_ns, next_diagnostics_ns=now_ns)
+        control = row_of(begun(at_station(self.station), now_ns))
+        return ControllerState(control, rows_of(SentCommand, self.rows), next_diagnostics_ns=now_ns)
 
     def due_ns(self, state: ControllerState) -> int:
         """Time of the next tick: a command leaves at least that often."""
-        return state.next_tick_ns
+        return int(columns_of(state.control)["next_tick_ns"][0])
 
     def step(
         self, state: ControllerState, event: Event, now_ns: int
     ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
         """Take in an estimate, a stop or a tick; each leads to a command."""
-        if now_ns < state.commanded_ns:
-            # The clock was set back: what is known would count as new again when it gets there once more.
-            state = replace(state, estimate=None, trend=None, sent=())
         if event.topic:
             state = replace(state, receipts=(*state.receipts, consumed(event, now_ns)))
-        fresh = False
-        if event.topic == topics.STOP:
-            state = replace(state, stopped=True)
-        elif event.topic == self.topics.estimate:
-            try:
-                estimate = from_message(decode_as(event.payload, msg.LeaderEstimate))
-            except (MalformedPayloadError, ValueError):
-                return replace(state, refused=counted(state.refused, "malformed")), ()
-            if not estimate.measured_ns <= estimate.capture_ns <= now_ns + CLOCK_TOLERANCE_NS:
-                return replace(state, refused=counted(state.refused, "bad_stamp")), ()
-            fresh = estimate.status is Status.TRACKING
-            kept = estimate if fresh else state.estimate
-            state = replace(state, status=estimate.status, heard=True, estimate=kept)
-            if fresh:
-                ahead = self._ahead(estimate, now_ns)
-                state = replace(state, trend=self.leader_turn.trend(state.trend, estimate, ahead))
-        elif event.topic == self.topics.leader_cmd_vel:
-            return self._hear_leader(state, event.payload), ()
-        elif event.topic == self.topics.side:
-            return self._hear_order(state, event.payload), ()
-        elif event.topic:
+        happened, cause = self._read(event)
+        control, commands = columns_of(state.control).copy(), columns_of(state.commands).copy()
+        state = replace(state, control=cast("Rows[ControlState]", control), commands=commands)
+        result = rows_of(Command, 1)
+        outcome = control_step(state.control, self.rules, state.commands, row_of(happened), result, now_ns)
+        if cause := cause or _CAUSES.get(outcome, ""):
+            return replace(state, refused=counted(state.refused, cause)), ()
+        if outcome != Outcome.COMMAND:
             return state, ()
-        state, out = self._command(state, now_ns, fresh=fresh)
-        return self._speak(state, out, now_ns)
-
-    def _hear_leader(self, state: ControllerState, payload: bytes) -> ControllerState:
-        try:
-            told = read_drive(payload, stamped=self.topics.stamped)
-        except MalformedPayloadError:
-            return replace(state, refused=counted(state.refused, "malformed"))
-        return replace(state, leader_u1=told.u)
-
-    def _hear_order(self, state: ControllerState, payload: bytes) -> ControllerState:
-        """Take an order, unless the leader may turn harder than a change of sides can make up for."""
-        try:
-            side = Side(decode_as(payload, msg.String).data)
-        except MalformedPayloadError:
-            return replace(state, refused=counted(state.refused, "malformed"))
-        except ValueError:
-            return replace(state, refused=counted(state.refused, "unknown_side"))
-        keeping = self.keeper.told(state.keeping, side)
-        if keeping is None:
-            return replace(state, refused=counted(state.refused, "unsafe_side_change"))
-        return replace(state, keeping=keeping)
-
-    def _command(
-        self, state: ControllerState, now_ns: int, *, fresh: bool
-    ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
-        keeping, decision = self._decide(state, now_ns)
-        owed = NOTHING_OWED
-        if decision.stop is not None:
-            keeping = with_changes(state.keeping, interrupted=True)
-        else:
-            sent, owed = self.resolution.round(decision.sent, state.owed, self.limits)
-            decision = with_changes(decision, sent=sent)
-        acting = SentCommand(now_ns + self.transport_ns, decision.sent.v, decision.sent.u)
+        command = load(Command, result, 0)
         receipts = state.receipts
-        state = replace(
-            state,
-            keeping=keeping,
-            sent=self._recent((*state.sent, acting), state.estimate, now_ns),
-            owed=owed,
-            receipts=(),
-            decided=counted(state.decided, decision.stop.value if decision.stop else "driving"),
-            commanded_ns=now_ns,
-            next_tick_ns=now_ns + self.tick_ns,
-        )
-        return state, self._messages(state, decision, receipts, now_ns, fresh=fresh)
+        word = command.stop.value if command.stop else "driving"
+        state = replace(state, receipts=(), decided=counted(state.decided, word))
+        fresh = happened.kind == Happening.ESTIMATE and happened.status == Status.TRACKING
+        return self._speak(state, self._messages(state, command, receipts, now_ns, fresh=fresh), now_ns)
 
-    def _decide(self, state: ControllerState, now_ns: int) -> tuple[Keeping, Decision]:
-        """Station and decision, as if the decision were to drive."""
-        estimate, keeping = state.estimate, state.keeping
-        wanted: Motion | None = None
-        age: float | None = None
-        if estimate is not None:
-            age = (now_ns - estimate.measured_ns) * _NS
-            if age <= self.max_age and _can_be(estimate):
-                ahead = self._ahead(estimate, now_ns)
-                further = self.leader_turn.further(state.trend, ahead)
-                shape = predict_shape(estimate, state.sent, now_ns + self.ahead_ns, self.lag, further)
-                u1 = self.leader_turn.when_acting(state.leader_u1, state.trend, ahead)
-                elapsed = min(max(now_ns - state.commanded_ns, _SHORTEST_STEP_NS), self.tick_ns) * _NS
-                seen = Motion(estimate.v1, estimate.u1)
-                keeping, wanted = self.keeper.drive(keeping, shape, seen, u1, elapsed)
-            else:
-                wanted = Motion(math.nan, math.nan)
-        return keeping, decide(
-            wanted,
-            self.limits,
-            age=age,
-            max_age=self.max_age,
-            settled=state.status is not Status.INITIALISING,
-            lost=state.status is Status.LOST,
-            stopped=state.stopped,
-        )
-
-    def _ahead(self, estimate: Estimate, now_ns: int) -> float:
-        """Time [s] from the capture of an estimate to when a command of now acts."""
-        return (now_ns + self.ahead_ns - estimate.capture_ns) * _NS
-
-    def _recent(
-        self, sent: tuple[SentCommand, ...], estimate: Estimate | None, now_ns: int
-    ) -> tuple[SentCommand, ...]:
-        """Commands that a prediction may still need: the one that acts at its begin, and later ones.
-
-        None begins before the capture of the estimate, or more than the largest age ago.
-        """
-        if estimate is None:
-            return sent[-1:]
-        begin_ns = max(estimate.capture_ns, now_ns - round(self.max_age / _NS))
-        first = 0
-        while first + 1 < len(sent) and sent[first + 1].from_ns <= begin_ns:
-            first += 1
-        return sent[first:]
+    def _read(self, event: Event) -> tuple[ControlEvent, str]:
+        """What an event says, or that it is nothing and by what cause."""
+        try:
+            if not event.topic:
+                return _happened(Happening.TICK), ""
+            if event.topic == topics.STOP:
+                return _happened(Happening.STOP), ""
+            if event.topic == self.topics.estimate:
+                return _reported(decode_as(event.payload, msg.LeaderEstimate)), ""
+            if event.topic == self.topics.leader_cmd_vel:
+                told = read_drive(event.payload, stamped=self.topics.stamped)
+                return _happened(Happening.LEADER, told.u), ""
+            if event.topic == self.topics.side:
+                word = decode_as(event.payload, msg.String).data
+                return _happened(Happening.ORDER, Side(word).sign), ""
+        except MalformedPayloadError:
+            return _happened(Happening.NOTHING), "malformed"
+        except ValueError:
+            # A status that does not exist, or a side.
+            is_side = event.topic == self.topics.side
+            return _happened(Happening.NOTHING), "unknown_side" if is_side else "malformed"
+        return _happened(Happening.NOTHING), ""
 
     def _messages(
         self,
         state: ControllerState,
-        decision: Decision,
+        command: Command,
         receipts: tuple[msg.Consumed, ...],
         now_ns: int,
         *,
         fresh: bool,
     ) -> tuple[Outgoing, ...]:
-        estimate, wanted = state.estimate, decision.wanted
-        drive = drive_message(decision.sent, now_ns, self.topics.follower, stamped=self.topics.stamped)
+        seen, sent = state.estimate, Motion(command.v, command.u)
+        drive = drive_message(sent, now_ns, self.topics.follower, stamped=self.topics.stamped)
         record = msg.Command(
             header=header(now_ns, self.topics.follower),
-            capture=to_time(estimate.capture_ns if estimate else 0),
-            measured=to_time(estimate.measured_ns if estimate else 0),
-            v2=decision.sent.v,
-            u2=decision.sent.u,
-            v2_wanted=wanted.v if wanted else math.nan,
-            u2_wanted=wanted.u if wanted else math.nan,
-            saturated=decision.saturated,
-            stop=decision.stop.value if decision.stop else "",
+            capture=to_time(seen.capture_ns if seen else 0),
+            measured=to_time(seen.measured_ns if seen else 0),
+            v2=command.v,
+            u2=command.u,
+            v2_wanted=command.v_wanted,
+            u2_wanted=command.u_wanted,
+            saturated=command.saturated,
+            stop=command.stop.value if command.stop else "",
             fresh=fresh,
             consumed=receipts,
         )
@@ -267,32 +200,40 @@ class ControllerNode:
 
     def report(self, state: ControllerState, now_ns: int) -> Outgoing:
         """Diagnostics: what was decided how often, and what was refused."""
-        problem = "" if state.heard else "waiting for estimates"
-        values: dict[str, object] = {"estimate": state.status.name.lower()}
-        values |= _side_report(state.keeping)
+        known = state.known
+        problem = "" if known.heard else "waiting for estimates"
+        values: dict[str, object] = {"estimate": Status(known.status).name.lower()}
+        values |= _side_report(known.follower.station)
         values |= named_counts("decided", state.decided) | named_counts("refused", state.refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
 
 
-def _side_report(keeping: Keeping) -> dict[str, object]:
-    """The side that is kept or gone to, and what holds a change up."""
-    if keeping.waits:
-        change = "waits for a leader that turns less"
-    else:
-        change = "none" if keeping.change.arrived else "under way"
-    return {"side": keeping.ordered.value, "side_change": change}
+def _happened(kind: Happening, number: float = 0.0) -> ControlEvent:
+    return ControlEvent(kind.value, 0, number, NO_REPORT)
 
 
-def _can_be(estimate: Estimate) -> bool:
-    """Whether every number that the law and the prediction rest on is one that a sound estimator gives."""
-    numbers = (
+def _reported(message: msg.LeaderEstimate) -> ControlEvent:
+    """What a message says of an estimate; raises ValueError for a status that does not exist."""
+    estimate = from_message(message)
+    reported = Reported(
+        estimate.capture_ns,
+        estimate.measured_ns,
         estimate.rho,
         estimate.alpha2,
         estimate.v1,
         estimate.alpha1,
         estimate.u1,
+        float(estimate.covariance[_U1, _U1]),
         estimate.v2,
         estimate.u2,
     )
-    # NaN is not below the largest, and infinity neither.
-    return estimate.rho > 0.0 and all(abs(number) < _LARGEST for number in numbers)
+    return ControlEvent(Happening.ESTIMATE.value, int(estimate.status), 0.0, reported)
+
+
+def _side_report(station: StationState) -> dict[str, object]:
+    """The side that is kept or gone to, and what holds a change up."""
+    if station.waits:
+        change = "waits for a leader that turns less"
+    else:
+        change = "none" if station.change.arrived else "under way"
+    return {"side": station.ordered.value, "side_change": change}

@@ -44,7 +44,6 @@ from estimation.tracking.follower_check import BELIEVED
 from estimation.tracking.follower_check import GATED as LEADER_OFF
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE, TrackPoint
 from estimation.tracking.tracker import (
-    INITIALISING,
     TrackSettings,
     add,
     capture_at,
@@ -104,6 +103,27 @@ class Taken(NamedTuple):
     verdict: int
     cause: int
     late: bool
+
+
+class Outcome(NamedTuple):
+    """The same without what is known: verdict, cause, and 1 for late."""
+
+    verdict: int
+    cause: int
+    late: int
+
+
+class Told(NamedTuple):
+    """An estimate, and why the newest measurement was not used."""
+
+    estimate: Estimate
+    cause: int
+
+
+@kernel
+def outcome_of(taken: Taken) -> Outcome:
+    """What became of a frame or sighting, in numbers."""
+    return Outcome(taken.verdict, taken.cause, 1 if taken.late else 0)
 
 
 @kernel
@@ -241,15 +261,7 @@ def _own_again(known: Known, memory: Memory, rules: Rules, since_ns: int) -> Non
 
 
 @kernel
-def status(known: Known, memory: Memory, rules: Rules, now_ns: int) -> int:
-    """Status of the track for one who looks at it at ``now_ns``."""
-    if known.track.length == 0:
-        return INITIALISING
-    return status_of(newest(memory.points, known.track), now_ns, rules.settings)
-
-
-@kernel
-def estimate(known: Known, memory: Memory, rules: Rules, now_ns: int) -> Estimate:
-    """Newest estimate of a track that has one."""
-    point = newest(memory.points, known.track)
-    return estimate_at(point, status_of(point, now_ns, rules.settings))
+def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) -> Told:
+    """Newest estimate of a track that has one, its status as seen at ``now_ns``."""
+    point = newest(points, known.track)
+    return Told(estimate_at(point, status_of(point, now_ns, rules.settings)), point.cause)

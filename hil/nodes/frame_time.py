@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from controllers.guard import CLOCK_TOLERANCE_NS
 from estimation.time.clock import Arrival, heard
 from estimation.time.host_time import HostTime, on_host
 from hil.scenario.files import refuse_two_corrections
 from hil.scenario.schema import Scenario
-from hil.wire.intake import CLOCK_TOLERANCE_NS, Frame
+from hil.wire.records import Frame
 
 
 @dataclass(frozen=True, slots=True)

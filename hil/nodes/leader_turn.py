@@ -3,48 +3,70 @@
 from __future__ import annotations
 
 import math
+from enum import IntEnum
 
-from estimation.tracking.estimate import QUANTITIES, Estimate
-from estimation.tracking.foresight import TurnTrend
-from hil.scenario.parts import foresight
-from hil.scenario.schema import Scenario
-
-_U1 = QUANTITIES.index("u1")
-_LARGEST = 1e6
+from estimation.tracking.foresight import Foresight, TurnTrend
+from estimation.tracking.prediction import LARGEST
+from formation.kernel import kernel
 
 
-class LeaderTurn:
-    """Steering by the law of a scenario. ``ahead`` [s] is from an estimate's capture to when a command acts.
+class TurnSource(IntEnum):
+    """Where a law has the leader's turn rate from.
 
-    ``is_told``: whether the law takes the turn rate that the leader is told to drive.
+    NOWHERE: it knows none. TOLD: what the leader is told to drive. FORESEEN: the estimate, carried on. FADED:
+    this as far as it is worth it.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        law = scenario.controller.law
-        self.is_told = law == "ideal"
-        self._fades, self._is_full = law == "faded", law == "feedforward"
-        self._foresight = foresight(scenario)
+    NOWHERE = 0
+    TOLD = 1
+    FORESEEN = 2
+    FADED = 3
 
-    def trend(self, before: TurnTrend | None, estimate: Estimate, ahead: float) -> TurnTrend | None:
-        """Trend with an estimate in it; one that no sound estimator gives ends it, not to stay in it."""
-        variance = float(estimate.covariance[_U1, _U1])
-        if not (abs(estimate.u1) < _LARGEST and 0.0 <= variance < _LARGEST):
-            return None
-        return self._foresight.heard(before, estimate.capture_ns, estimate.u1, variance, ahead)
 
-    def further(self, trend: TurnTrend | None, ahead: float) -> float:
-        """Angle [rad] by which the leader will have turned further than its estimated u1 turns it.
+SOURCES = {
+    "independent": TurnSource.NOWHERE,
+    "ideal": TurnSource.TOLD,
+    "feedforward": TurnSource.FORESEEN,
+    "faded": TurnSource.FADED,
+}
+"""Sources by the law's name."""
 
-        None without a trend, and none for the law that feeds u1 forward in full, whatever its noise: the
-        slope would be in what it does twice.
-        """
-        return 0.0 if trend is None or self._is_full else self._foresight.further(trend, ahead)
+_FORESEEN, _FADED = TurnSource.FORESEEN.value, TurnSource.FADED.value
 
-    def when_acting(self, told: float, trend: TurnTrend | None, ahead: float) -> float:
-        """Turn rate to give to the law: ``told`` for all laws that foresee none; nan without a trend."""
-        if not (self._fades or self._is_full):
-            return told
-        if trend is None:
-            return math.nan
-        u1 = self._foresight.predicted(trend)
-        return u1 * self._foresight.weight(trend.variance, ahead) if self._fades else u1
+
+@kernel
+def trend_with(
+    foresight: Foresight, before: TurnTrend, capture_ns: int, u1: float, variance: float, ahead: float
+) -> TurnTrend:
+    """Trend with an estimate in it; one that no sound estimator gives ends it, not to stay in it.
+
+    ``ahead`` [s] is from the estimate's capture to when a command acts.
+    """
+    if abs(u1) < LARGEST and 0.0 <= variance < LARGEST:
+        return foresight.heard(before, capture_ns, u1, variance, ahead)
+    return TurnTrend(False, 0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def turned_further(source: int, foresight: Foresight, trend: TurnTrend, ahead: float) -> float:
+    """Angle [rad] by which the leader will have turned further than its estimated u1 turns it.
+
+    None without a trend, and none for the law that feeds u1 forward in full, whatever its noise: the slope
+    would be in what it does twice.
+    """
+    if source == _FORESEEN or not trend.known:
+        return 0.0
+    return foresight.further(trend, ahead)
+
+
+@kernel
+def turn_when_acting(source: int, foresight: Foresight, trend: TurnTrend, told: float, ahead: float) -> float:
+    """Turn rate [rad/s] to give to the law: ``told`` for all laws that foresee none; nan without a trend."""
+    if source != _FORESEEN and source != _FADED:
+        return told
+    if not trend.known:
+        return math.nan
+    u1 = foresight.predicted(trend)
+    if source == _FADED:
+        return u1 * foresight.weight(trend.variance, ahead)
+    return u1

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from estimation.tracking.screening import Cause
-from estimation.tracking.tracker import Status, Track
+from estimation.tracking.follower_check import Cause
+from estimation.tracking.tracker import Status
 
 REASONS = {
     Status.INITIALISING: "speed and bearing of the leader not yet known well enough",
@@ -21,7 +21,6 @@ REJECTIONS = {
 }
 
 
-def reason_for(status: Status, track: Track) -> str:
-    """Why an estimate does not have the status TRACKING; empty if it has."""
-    cause = track[-1].cause
-    return REJECTIONS[cause] if status is Status.REJECTING and cause is not None else REASONS[status]
+def reason_for(status: Status, cause: Cause) -> str:
+    """Why an estimate is not TRACKING, ``cause`` being that of its point; empty if it is."""
+    return REJECTIONS.get(cause, REASONS[status]) if status is Status.REJECTING else REASONS[status]

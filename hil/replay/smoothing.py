@@ -10,10 +10,12 @@ from estimation.bounds.certified import Certain, Failed
 from estimation.models.measurement import Measurement
 from estimation.tracking.estimate import estimate_of
 from estimation.tracking.smoother import smooth
+from estimation.tracking.track import Tracker
+from estimation.tracking.track_point import NO_JUMP
 from hil.nodes.estimator import NAME, EstimatorNode, EstimatorState
-from hil.nodes.leader_filter import refuse_bias_states
 from hil.nodes.node import Outgoing
 from hil.nodes.status_reasons import REASONS
+from hil.scenario.leader_model import refuse_bias_states
 from hil.scenario.schema import Scenario
 from hil.wire.certified_message import certified_message
 from hil.wire.estimate_message import to_message
@@ -39,11 +41,11 @@ class ListeningEstimator(EstimatorNode):
     ) -> tuple[EstimatorState, tuple[Outgoing, ...]]:
         """Step as ever, and keep what is new in the track."""
         after, sent = super().step(state, event, now_ns)
-        if after.track is not state.track:
-            self.measurements |= {point.measurement.capture_ns: point.measurement for point in after.track}
-            if self.certifying is not None and after.track:
-                newest_ns = after.track[-1].measurement.capture_ns
-                known = self.certifying.certain(after.believed, after.own.history, newest_ns)
+        if event.topic and (track := after.memory.track):
+            self.measurements |= {point.measurement.capture_ns: point.measurement for point in track}
+            if self.certifying is not None:
+                newest_ns = track[-1].measurement.capture_ns
+                known = self.certifying.certain(after.believed, after.memory.history, newest_ns)
                 self.certain[newest_ns] = known
         return after, sent
 
@@ -62,11 +64,12 @@ def smoothed_estimates(node: ListeningEstimator) -> Smoothed:
     They are stamped as computed at their capture, as a smoother knows no delay.
     """
     estimates, certified = [], []
-    for point in smooth(node.tracker, node.measurements.values()):
+    tracker = Tracker(node.rules.filter, node.rules.settings)
+    for point in smooth(tracker, node.measurements.values()):
         measurement = point.measurement
         capture_ns, frame_id = measurement.capture_ns, node.topics.follower
-        status = node.tracker.status((point,), capture_ns)
-        estimate = estimate_of(point.belief, measurement, status, point.nis, point.used_ns)
+        status = tracker.status((point,), capture_ns)
+        estimate = estimate_of(point.belief, measurement, status, point.nis, point.used_ns, NO_JUMP)
         estimates.append(to_message(estimate, capture_ns, frame_id, REASONS[status], node.assumed, ()))
         if node.certifying is not None:
             certain = node.certain.get(capture_ns, Failed.UNSEEN)

@@ -6,16 +6,16 @@ one place) is answered here, with a :class:`~hil.errors.UsageError` that names t
 
 from __future__ import annotations
 
-from controllers.laws import LAWS, Gains
+from controllers.laws import Gains
 from controllers.limits import Limits
 from controllers.side_change import gentle
 from controllers.station_keeper import StationKeeper
-from estimation.models.motion import LeaderLimits, ProcessNoise
 from estimation.tracking.foresight import Foresight
 from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
 from formation.spacing import Spacing
 from formation.station import Side, Station
 from hil.errors import UsageError
+from hil.scenario.leader_model import process_noise
 from hil.scenario.schema import ConstantProgram, ImpulseProgram, Scenario, SinusoidProgram
 
 
@@ -64,7 +64,6 @@ def may_change_sides(scenario: Scenario) -> bool:
 def station_keeper(scenario: Scenario) -> StationKeeper:
     """The scenario's law at the follower's station, whichever side that comes to be on."""
     return StationKeeper(
-        LAWS[scenario.controller.law],
         gains(scenario),
         limits(scenario),
         knows_turn=knows_turn(scenario),
@@ -74,7 +73,4 @@ def station_keeper(scenario: Scenario) -> StationKeeper:
 
 def foresight(scenario: Scenario) -> Foresight:
     """What is known of the leader's steering; its diffusion is that of the estimator's own model."""
-    leader, given = scenario.leader, scenario.estimator
-    limits = LeaderLimits(leader.v_eps, leader.k_v, leader.k_u)
-    noise = ProcessNoise.by_rule(limits, given.turn_bandwidth, given.speed_bandwidth)
-    return Foresight(leader.k_u, noise.q_u)
+    return Foresight.of(scenario.leader.k_u, process_noise(scenario).q_u)

@@ -9,12 +9,12 @@ from typing import Any
 
 from controllers.gain_design import Design, design
 from controllers.gain_task import Task
-from estimation.models.motion import LeaderLimits, ProcessNoise
 from formation.invariant_set import Disturbed, invariant_set
 from formation.shape import ABREAST_ALPHA2
 from formation.spacing import Spacing
 from hil.errors import UsageError
 from hil.scenario.certificate import certificate_of, premises_of
+from hil.scenario.leader_model import process_noise
 from hil.scenario.parts import limits
 from hil.scenario.schema import Scenario
 
@@ -35,9 +35,7 @@ def task_of(scenario: Scenario) -> Task:
     world = given.front_end == "world"
     rho_0, rate = scenario.formation.rho_0, scenario.mocap.rate_hz
     sigma = given.sigma_position if world else max(given.sigma_range, rho_0 * given.sigma_bearing)
-    noise = ProcessNoise.by_rule(
-        LeaderLimits(leader.v_eps, leader.k_v, leader.k_u), given.turn_bandwidth, given.speed_bandwidth
-    )
+    noise = process_noise(scenario)
     slow, density = premises.speeds.lowest, sigma * sigma / rate
     corner = (slow * slow * noise.q_u / density) ** (1.0 / 6.0)
     sd_v1 = math.sqrt(3.0 * corner**3 * density)

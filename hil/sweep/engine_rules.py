@@ -7,10 +7,10 @@ import math
 import msgspec
 
 from estimation.filters.estimators import settling
-from estimation.models.motion import LeaderLimits, ProcessNoise
 from estimation.tracking.tracker import TrackSettings
 from hil.errors import UsageError
 from hil.lockstep.run import STOPPING_NS
+from hil.scenario.leader_model import process_noise
 from hil.scenario.parts import foresight
 from hil.scenario.schema import ConstantProgram, ImpulseProgram, Scenario, SinusoidProgram
 from hil.sweep import engine_kernels as kernels
@@ -122,8 +122,7 @@ def _lab(scenario: Scenario) -> dict[str, float]:
 
 def _eye(scenario: Scenario) -> dict[str, float]:
     given, leader = scenario.estimator, scenario.leader
-    limits = LeaderLimits(leader.v_eps, leader.k_v, leader.k_u)
-    noise = ProcessNoise.by_rule(limits, given.turn_bandwidth, given.speed_bandwidth)
+    noise = process_noise(scenario)
     return {
         "kind": KINDS[given.kind],
         "reacquire_frames": given.reacquire_frames,

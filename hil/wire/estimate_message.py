@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from estimation.bounds.error_bounds import InputErrors, Perceived, RateErrors
 from estimation.bounds.guarantees import guaranteed_rate, leader_acceleration
 from estimation.bounds.live_bounds import ErrorBounds, LawConstants, live_bounds
-from estimation.models.measurement import PoseNoise
-from estimation.models.motion import FollowerMotion
-from estimation.own_motion.own_track import OwnNoise, steady_noise
-from estimation.tracking.estimate import Estimate
-from estimation.tracking.screening import NO_DOUBT
+from estimation.models.coordinated_turn import FollowerMotion
+from estimation.own_motion.steady_noise import steady_noise
+from estimation.tracking.estimate import Estimate, joint_of
+from estimation.tracking.track_point import NO_JUMP
 from estimation.tracking.tracker import Status
 from formation.spacing import Spacing
+from hil.scenario.leader_model import own_noise
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 from hil.wire.message_types import Consumed, LeaderEstimate
@@ -86,12 +86,11 @@ class AssumedErrors:
 
 def _own_motion_noise(scenario: Scenario) -> tuple[float, float]:
     """Standard deviations of v2 [m/s] and u2 [rad/s], by where the estimator has them from."""
-    given, limits = scenario.estimator, scenario.controller
+    given = scenario.estimator
     if given.own_motion == "odometry":
         return given.sigma_v2, given.sigma_u2
-    noise = OwnNoise(PoseNoise(given.sigma_position, given.sigma_heading), limits.v_max, limits.u_max)
     told = FollowerMotion(0.0, 0.0, given.sigma_v2, given.sigma_u2) if given.own_motion == "fused" else None
-    return steady_noise(noise, 1.0 / scenario.mocap.rate_hz, told)
+    return steady_noise(own_noise(scenario), 1.0 / scenario.mocap.rate_hz, told)
 
 
 def perceived(estimate: Estimate) -> Perceived:
@@ -109,11 +108,11 @@ def perceived(estimate: Estimate) -> Perceived:
 
 
 def bounds_of(estimate: Estimate, assumed: AssumedErrors) -> tuple[float, float, float]:
-    """Extended bounds of v1 [m/s], alpha1 [rad] and h [rad/s] of an estimate, its doubt included."""
+    """Extended bounds of v1 [m/s], alpha1 [rad] and h [rad/s] of an estimate, its jump included."""
     rho = max(estimate.rho, 1e-6)
     errors = assumed.errors(rho)
-    if estimate.doubt is not NO_DOUBT:
-        errors = _doubted(errors, estimate, rho)
+    if estimate.jump.since_ns:
+        errors = _with_jump(errors, estimate, rho)
     return live_bounds(
         (estimate.rho, estimate.alpha2),
         (estimate.v1, estimate.alpha1),
@@ -124,19 +123,19 @@ def bounds_of(estimate: Estimate, assumed: AssumedErrors) -> tuple[float, float,
     )
 
 
-def _doubted(errors: ErrorBounds, estimate: Estimate, rho: float) -> ErrorBounds:
-    """Errors that allow for a doubt too.
+def _with_jump(errors: ErrorBounds, estimate: Estimate, rho: float) -> ErrorBounds:
+    """Errors that allow for a jump too.
 
     It moves the leader by up to ``position`` and turns the line to it by up to position / rho, and the
     relative velocity, at most v1 + |v2|, is split along and across that line.
     """
-    turned = estimate.doubt.position / rho
-    rate = (estimate.v1 + abs(estimate.v2)) * (turned + estimate.doubt.heading)
+    turned = estimate.jump.position / rho
+    rate = (estimate.v1 + abs(estimate.v2)) * (turned + estimate.jump.heading)
     return ErrorBounds(
         M_rho=errors.M_rho + rate,
         M_alpha2=errors.M_alpha2 + rate / rho,
-        E_rho=errors.E_rho + estimate.doubt.position,
-        E_alpha2=errors.E_alpha2 + turned + estimate.doubt.heading,
+        E_rho=errors.E_rho + estimate.jump.position,
+        E_alpha2=errors.E_alpha2 + turned + estimate.jump.heading,
         E_v2=errors.E_v2,
         E_u2=errors.E_u2,
     )
@@ -190,7 +189,8 @@ def from_message(message: LeaderEstimate) -> Estimate:
         u1=message.u1,
         v2=message.v2,
         u2=message.u2,
-        covariance=message.covariance.reshape(5, 5),
+        joint=joint_of(message.covariance.reshape(5, 5)),
         nis=message.nis,
         status=Status(message.status),
+        jump=NO_JUMP,
     )

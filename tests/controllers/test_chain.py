@@ -96,8 +96,9 @@ def test_the_compiled_chain_is_that_of_the_laws(
     times = np.linspace(0.0, 6.0, 31)
     ours = simulate_chain(FIRST, shapes, program, gains, limits, times, knows_turn=law != "independent")
     known = in_the_world(shapes, program, law, gains, limits, times)
-    np.testing.assert_allclose(ours.poses[:, :, :2], known[:, :, :2], atol=2e-7)
-    np.testing.assert_allclose(wrap(ours.poses[:, :, 2] - known[:, :, 2]), 0.0, atol=2e-7)
+    # Limits make corners, over which the order of the method does not hold.
+    np.testing.assert_allclose(ours.poses[:, :, :2], known[:, :, :2], atol=5e-7)
+    np.testing.assert_allclose(wrap(ours.poses[:, :, 2] - known[:, :, 2]), 0.0, atol=5e-7)
     assert np.any(np.abs(ours.wanted[:, 1:]) > limits.v_max)
     assert float(np.abs(ours.v[:, 1:]).max()) <= limits.v_max
     for row in (0, 17):

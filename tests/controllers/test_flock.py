@@ -66,9 +66,9 @@ def test_the_compiled_flock_is_that_of_the_laws(seed: int, law: str, most: int, 
     state = scattered(places, seed, 0.3, 1.0)
     chosen = np.empty((21, most), dtype=np.int64)
     kernels.choose(state, may_follow(places), chosen)
-    setting = np.array([MU1, MU2, MU_RHO, limits.v_max, limits.u_max, tilt, float(law == "ideal")])
+    flock = kernels.Flock(Gains(MU1, MU2, GAINS.spacing, tilt=tilt).settings(limits), law == "ideal")
     change, told = np.empty((21, 3)), np.empty((4, 21))
-    kernels.rates(leader.v, leader.u, state, places, chosen, setting, change, told)
+    kernels.rates(leader, state, places, chosen, flock, change, told)
     agents = [Pose(*row) for row in state.tolist()]
     motions = [leader]
     for agent in range(1, 21):
@@ -134,7 +134,7 @@ def test_the_step_is_of_fourth_order() -> None:
 def jacobian(places: FloatArray, chosen: NDArray[np.int64]) -> FloatArray:
     """Of all followers' rates by their poses, in formation behind a leader that drives straight on."""
     agents, h = len(places), 1e-6
-    setting = np.array([MU1, MU2, MU_RHO, 1e3, 1e3, 0.0, 0.0])
+    flock = kernels.Flock(Gains(MU1, MU2, GAINS.spacing).settings(), False)
     found = np.empty((3 * agents - 3, 3 * agents - 3))
     state = np.column_stack([places, np.zeros(agents)])
     for column in range(3 * agents - 3):
@@ -142,7 +142,7 @@ def jacobian(places: FloatArray, chosen: NDArray[np.int64]) -> FloatArray:
         for side in (-h, h):
             moved, change = state.copy(), np.empty((agents, 3))
             moved[1 + column // 3, column % 3] += side
-            kernels.rates(V1, 0.0, moved, places, chosen, setting, change, np.empty((4, agents)))
+            kernels.rates(Motion(V1, 0.0), moved, places, chosen, flock, change, np.empty((4, agents)))
             sides.append(change[1:].ravel())
         found[:, column] = (sides[1] - sides[0]) / (2.0 * h)
     return found

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.limits import Limits
-from controllers.resolution import NOTHING_OWED, Resolution
+from controllers.resolution import NO_REMAINDER, Resolution
 from formation.pose import Motion
 
 LIMITS = Limits(0.22, 2.84)
@@ -22,11 +22,11 @@ def as_the_firmware_takes_it(value: float) -> float:
 
 @given(wanted_motion)
 def test_on_average_the_robot_gets_what_was_wanted(wanted: Motion) -> None:
-    owed, got_v, got_u, count = NOTHING_OWED, 0.0, 0.0, 200
+    remainder, got_v, got_u, count = NO_REMAINDER, 0.0, 0.0, 200
     for _ in range(count):
-        sent, owed = STEPS.round(wanted, owed, LIMITS)
+        sent, remainder = STEPS.round(wanted, remainder, LIMITS)
         assert LIMITS.apply(sent) == (sent, False)
-        assert max(abs(owed.v), abs(owed.u)) <= 0.005 + 1e-12
+        assert max(abs(remainder.v), abs(remainder.u)) <= 0.005 + 1e-12
         got_v, got_u = (
             got_v + as_the_firmware_takes_it(sent.v),
             got_u + as_the_firmware_takes_it(sent.u),
@@ -38,22 +38,22 @@ def test_on_average_the_robot_gets_what_was_wanted(wanted: Motion) -> None:
 
 @pytest.mark.parametrize("steps", range(-284, 285))
 def test_a_link_that_truncates_takes_whole_steps_as_they_are(steps: int) -> None:
-    sent, owed = STEPS.round(Motion(0.0, steps * 0.01), NOTHING_OWED, LIMITS)
+    sent, remainder = STEPS.round(Motion(0.0, steps * 0.01), NO_REMAINDER, LIMITS)
     assert int(sent.u * 100) == steps
-    assert abs(owed.u) < 1e-12
+    assert abs(remainder.u) < 1e-12
 
 
 @given(wanted_motion)
 def test_without_steps_commands_stay_as_they_are(wanted: Motion) -> None:
-    assert Resolution().round(wanted, NOTHING_OWED, LIMITS) == (wanted, NOTHING_OWED)
+    assert Resolution().round(wanted, NO_REMAINDER, LIMITS) == (wanted, NO_REMAINDER)
 
 
 def test_at_a_limit_nothing_piles_up() -> None:
-    limits, owed = Limits(0.225, 2.0), NOTHING_OWED
+    limits, remainder = Limits(0.225, 2.0), NO_REMAINDER
     for _ in range(100):
-        sent, owed = STEPS.round(Motion(0.225, 0.0), owed, limits)
+        sent, remainder = STEPS.round(Motion(0.225, 0.0), remainder, limits)
         assert as_the_firmware_takes_it(sent.v) == 0.22
-    sent, _ = STEPS.round(Motion(0.1, 0.0), owed, limits)
+    sent, _ = STEPS.round(Motion(0.1, 0.0), remainder, limits)
     assert as_the_firmware_takes_it(sent.v) in (0.1, 0.11)
 
 

@@ -16,6 +16,7 @@ from controllers.side_change import CORRECTION, SideChange, change_step, change_
 from controllers.side_change_run import run_with_changes
 from controllers.station_keeper import StationKeeper
 from formation.leader import Constant
+from formation.line import line_of
 from formation.pose import Pose
 from formation.shape import Shape, follower_pose
 from formation.spacing import Spacing, lyapunov
@@ -49,7 +50,7 @@ def test_the_follower_goes_round_behind_the_leader(first: Side) -> None:
         start,
         follower,
         Constant(0.5, 0.0),
-        StationKeeper(LAWS["independent"], gains, LIMITS, knows_turn=False, may_change=True),
+        StationKeeper(gains, LIMITS, knows_turn=False, may_change=True),
         [(5.0, first.other)],
         times,
     )
@@ -64,9 +65,8 @@ def test_the_follower_goes_round_behind_the_leader(first: Side) -> None:
 @given(st.floats(0.3, 1.0), st.floats(-3.1, 3.1), st.floats(-3.1, 3.1))
 def test_it_hands_over_inside_the_proved_region_only(rho: float, alpha1: float, alpha2: float) -> None:
     shape = Shape(rho, alpha1, alpha2)
-    state, motion = change_step(
-        change_to(Side.LEFT, shape, GAINS), shape, 0.5, 0.0, LAWS["independent"], GAINS, LIMITS, 0.05
-    )
+    line = line_of(shape)
+    state, motion = change_step(change_to(Side.LEFT.sign, line), GAINS.settings(LIMITS), line, 0.5, 0.0, 0.05)
     assert math.isfinite(motion.v)
     assert math.isfinite(motion.u)
     if state.arrived:
@@ -75,8 +75,10 @@ def test_it_hands_over_inside_the_proved_region_only(rho: float, alpha1: float, 
 
 def test_at_its_side_already_it_drives_by_the_law() -> None:
     at = Shape(0.6, ABREAST.alpha1 + 0.1, ABREAST.alpha2 - 0.1)
+    line = line_of(at)
     state, motion = change_step(
-        change_to(Side.RIGHT, at, GAINS), at, 0.5, 0.2, LAWS["ideal"], GAINS, LIMITS, 0.05
+        change_to(Side.RIGHT.sign, line), GAINS.settings(LIMITS), line, 0.5, 0.2, 0.05
     )
-    assert state == SideChange(ABREAST, at.alpha1, arrived=True)
+    assert state == SideChange(Side.RIGHT.sign, state.phase, True)
+    assert state.phase == pytest.approx(at.alpha1)
     assert motion == LAWS["ideal"](at, 0.5, 0.2, GAINS, LIMITS)

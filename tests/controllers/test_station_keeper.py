@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -10,11 +9,11 @@ from hypothesis import strategies as st
 from controllers.laws import LAWS, Gains
 from controllers.limits import Limits
 from controllers.side_change import CORRECTION
-from controllers.station_keeper import Keeping, StationKeeper
+from controllers.station_keeper import StationKeeper, StationState
 from formation.pose import Motion
 from formation.shape import Shape
 from formation.spacing import Spacing
-from formation.station import Side, Station
+from formation.station import Side
 
 GAINS, LIMITS = Gains(1.0, 2.0, Spacing(0.5, 2.0)), Limits(1.5, 2.84)
 AT_STATION = Shape(0.5, -0.5 * math.pi, 0.5 * math.pi)
@@ -23,19 +22,19 @@ TOO_HARD = 1.1 * CORRECTION * V1 / GAINS.spacing.rho_0
 
 
 def keeper(law: str = "independent", *, may_change: bool = True) -> StationKeeper:
-    return StationKeeper(LAWS[law], GAINS, LIMITS, knows_turn=law != "independent", may_change=may_change)
+    return StationKeeper(GAINS, LIMITS, knows_turn=law != "independent", may_change=may_change)
 
 
-def ordered(side: Side) -> Keeping:
-    keeping = keeper().told(keeper().begin(), side)
-    assert keeping is not None
-    return keeping
+def ordered(side: Side) -> StationState:
+    state = keeper().order(keeper().begin(), side)
+    assert state is not None
+    return state
 
 
 def test_where_a_change_is_unsafe_an_order_for_another_side_is_refused() -> None:
     strict = keeper(may_change=False)
-    assert strict.told(strict.begin(), Side.RIGHT) == strict.begin()
-    assert strict.told(strict.begin(), Side.LEFT) is None
+    assert strict.order(strict.begin(), Side.RIGHT) == strict.begin()
+    assert strict.order(strict.begin(), Side.LEFT) is None
 
 
 @given(
@@ -45,9 +44,9 @@ def test_where_a_change_is_unsafe_an_order_for_another_side_is_refused() -> None
     law=st.sampled_from(["independent", "ideal"]),
 )
 def test_without_orders_it_is_the_law_to_the_last_bit(shape: Shape, v1: float, u1: float, law: str) -> None:
-    keeping, motion = keeper(law).drive(keeper(law).begin(), shape, Motion(v1, u1), u1, 0.01)
+    state, motion = keeper(law).drive(keeper(law).begin(), shape, Motion(v1, u1), u1, 0.01)
     assert motion == LAWS[law](shape, v1, u1, GAINS, LIMITS)
-    assert keeping == keeper(law).begin()
+    assert state == keeper(law).begin()
 
 
 def test_a_change_waits_for_a_leader_that_turns_gently() -> None:
@@ -63,7 +62,7 @@ def test_a_change_waits_for_a_leader_that_turns_gently() -> None:
 def test_a_leader_that_turns_harder_on_the_way_does_not_end_the_change() -> None:
     begun, _ = keeper().drive(ordered(Side.LEFT), AT_STATION, Motion(V1, 0.0), math.nan, 0.01)
     going, _ = keeper().drive(begun, AT_STATION, Motion(V1, TOO_HARD), math.nan, 0.01)
-    assert (going.change.station.side, going.change.arrived) == (Side.LEFT, False)
+    assert (going.change.side, going.change.arrived) == (Side.LEFT, False)
 
 
 @pytest.mark.parametrize("u1", [0.0, TOO_HARD])
@@ -71,14 +70,14 @@ def test_after_a_stop_a_change_begins_anew_from_where_the_pair_is(u1: float) -> 
     """The leader has driven on meanwhile: the place on the way that was left is somewhere else now."""
     begun, _ = keeper().drive(ordered(Side.LEFT), AT_STATION, Motion(V1, 0.0), math.nan, 0.01)
     behind = Shape(1.5, 2.5, 0.3)
-    going, _ = keeper().drive(replace(begun, interrupted=True), behind, Motion(V1, u1), math.nan, 0.01)
-    assert going.change.station == Station(Side.LEFT)
+    going, _ = keeper().drive(begun._replace(interrupted=True), behind, Motion(V1, u1), math.nan, 0.01)
+    assert going.change.side is Side.LEFT
     assert going.change.phase == pytest.approx(behind.alpha1, abs=0.02)
     assert not going.interrupted
 
 
 def test_after_a_stop_at_its_station_the_law_goes_on() -> None:
-    stood = replace(keeper().begin(), interrupted=True)
-    keeping, motion = keeper().drive(stood, AT_STATION, Motion(V1, 0.0), math.nan, 0.01)
-    assert keeping == keeper().begin()
+    stood = keeper().begin()._replace(interrupted=True)
+    state, motion = keeper().drive(stood, AT_STATION, Motion(V1, 0.0), math.nan, 0.01)
+    assert state == keeper().begin()
     assert motion == LAWS["independent"](AT_STATION, V1, math.nan, GAINS, LIMITS)

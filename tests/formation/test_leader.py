@@ -7,8 +7,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
+from formation.kernel import entry, interpreted
+from formation.leader import (
+    Constant,
+    Impulse,
+    LeaderProgram,
+    Program,
+    Sinusoid,
+    Table,
+    TableRow,
+    driven,
+    encoded,
+)
 from formation.pose import Motion
+from formation.records import Rows, borrowed
+
+
+@entry
+def driven_at(program: Program, table: Rows[TableRow], t: float) -> Motion:
+    return driven(program, borrowed(table), t)
 
 
 def test_leader_of_the_papers_simulation() -> None:
@@ -72,3 +89,32 @@ def test_programs_name_the_step_that_misses_nothing() -> None:
     assert Constant(0.5).longest_step == math.inf
     assert Impulse(0.5, 1.0, 5.0, 0.2).longest_step < 0.2
     assert Table([0.0, 1.0, 1.25], [0.0] * 3, [0.0] * 3).longest_step == 0.25
+
+
+@given(
+    st.sampled_from(
+        [
+            Constant(0.5, -0.1),
+            Sinusoid(0.08, 0.2, 0.5, 1.7),
+            Impulse(0.5, 1.0, 5.0, 0.3),
+            Table([0.1], [0.2], [0.3]),
+            Table([-1.0, 0.0, 0.3, 2.0], [0.1, 0.7, 0.2, 0.0], [0.3, -0.4, 0.5, 1.0]),
+        ]
+    ),
+    st.floats(-12.0, 12.0) | st.sampled_from([-1.0, 0.0, 0.1, 0.3, 2.0]),
+)
+@settings(deadline=None)
+def test_compiled_code_drives_the_same_bits(program: LeaderProgram, t: float) -> None:
+    numbers, rows = encoded(program)
+    assert driven_at(numbers, rows, t) == interpreted(driven_at)(numbers, rows, t) == program(t)
+
+
+def test_a_program_of_ones_own_is_not_for_compiled_code() -> None:
+    class Waiting:
+        period, longest_step = None, math.inf
+
+        def __call__(self, t: float) -> Motion:
+            return Motion(0.0, 0.0)
+
+    with pytest.raises(ValueError, match="Waiting is no kind"):
+        encoded(Waiting())

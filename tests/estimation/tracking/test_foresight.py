@@ -8,19 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import solve_continuous_are
 
-from estimation.tracking.foresight import Foresight, TurnTrend
+from estimation.tracking.foresight import NO_TREND, Foresight, TurnTrend
 
-SIGHT = Foresight(k_u=0.7, diffusion=0.245)
+SIGHT = Foresight.of(k_u=0.7, diffusion=0.245)
 MS = 1_000_000
 rates = st.floats(-0.7, 0.7)
 variances = st.floats(0.0, 1.0)
 
 
 def after(u1: list[float], variance: float, ahead: float, step_ms: float = 1.0) -> TurnTrend:
-    trend = None
+    trend = NO_TREND
     for number, each in enumerate(u1):
         trend = SIGHT.heard(trend, round(number * step_ms * MS), each, variance, ahead)
-    assert trend is not None
     return trend
 
 
@@ -90,7 +89,7 @@ def test_the_more_doubt_the_less_is_fed_forward(one: float, other: float, ahead:
 
 @given(rates, rates, st.floats(0.0, 2.0))
 def test_an_estimate_that_says_little_is_not_turned_further(u1: float, slow: float, ahead: float) -> None:
-    assert SIGHT.further(TurnTrend(0, u1, 1.5 * SIGHT.spread, slow), ahead) == 0.0
+    assert SIGHT.further(TurnTrend(True, 0, u1, 1.5 * SIGHT.spread, slow), ahead) == 0.0
 
 
 def test_an_estimate_heard_again_changes_nothing() -> None:
@@ -101,4 +100,4 @@ def test_an_estimate_heard_again_changes_nothing() -> None:
 @pytest.mark.parametrize(("k_u", "diffusion"), [(0.0, 1.0), (math.inf, 1.0), (1.0, 0.0), (1.0, math.nan)])
 def test_nonsense_is_refused(k_u: float, diffusion: float) -> None:
     with pytest.raises(ValueError, match="expected a positive finite number"):
-        Foresight(k_u, diffusion)
+        Foresight.of(k_u, diffusion)

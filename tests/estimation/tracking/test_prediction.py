@@ -14,14 +14,26 @@ from estimation.filters.estimators import make_estimator
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, PoseNoise, measure_body_from_mocap, measure_world
 from estimation.tracking.estimate import Estimate, estimate_of, joint_of
-from estimation.tracking.foresight import Foresight, TurnTrend
-from estimation.tracking.prediction import SentCommand, predict_shape
+from estimation.tracking.foresight import NO_TREND, Foresight, TurnTrend
+from estimation.tracking.prediction import (
+    Reported,
+    SentCommand,
+    predicted,
+    sight_of,
+    still_needed,
+    with_command,
+)
 from estimation.tracking.track import as_filter
 from estimation.tracking.track_point import NO_JUMP
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray, wrap
+from formation.kernel import entry, interpreted
+from formation.line import Line, shape_of_line
 from formation.pose import Pose, advance
+from formation.records import Rows, borrowed, load, rows_of
+from formation.ring import EMPTY, Ring, place
 from formation.shape import Shape, shape_of
+from tests.bits import same_bits
 
 MS = 1_000_000
 NOW_NS = 1_000 * MS
@@ -43,8 +55,42 @@ def estimate(v2: float = 0.1, u2: float = 0.4, alpha2: float = 1.2) -> Estimate:
         joint=joint_of(np.eye(5)),
         nis=1.0,
         status=Status.TRACKING,
-        jump=NO_JUMP,
     )
+
+
+def reported(given: Estimate) -> Reported:
+    return Reported(
+        given.capture_ns,
+        given.measured_ns,
+        given.rho,
+        given.alpha2,
+        given.v1,
+        given.alpha1,
+        given.u1,
+        float(given.covariance[4, 4]),
+        given.v2,
+        given.u2,
+    )
+
+
+@entry
+def predicted_line(
+    told: Reported, rows: Rows[SentCommand], sent: Ring, until_ns: int, lag: float, further: float
+) -> Line:
+    return predicted(sight_of(told), borrowed(rows), sent, until_ns, lag, further)
+
+
+def predict_shape(
+    given: Estimate, commands: list[SentCommand], until_ns: int, lag: float, further: float = 0.0
+) -> Shape:
+    """Prediction by the kernels, compiled and interpreted."""
+    rows, sent = rows_of(SentCommand, 256), EMPTY
+    for command in commands:
+        sent = with_command(rows, sent, command)
+    line = predicted_line(reported(given), rows, sent, until_ns, lag, further)
+    plain = interpreted(predicted_line)(reported(given), rows, sent, until_ns, lag, further)
+    same_bits(line, plain)
+    return shape_of_line(line)
 
 
 def integrated(
@@ -116,7 +162,7 @@ def test_short_arcs_leave_nothing_of_that() -> None:
 
 def test_before_the_capture_nothing_is_predicted() -> None:
     for until_ns in (NOW_NS, NOW_NS - 500 * MS):
-        assert predict_shape(estimate(), [], until_ns, 0.1) == Shape(0.3, -1.3, 1.2)
+        assert_close(predict_shape(estimate(), [], until_ns, 0.1), Shape(0.3, -1.3, 1.2), 1e-15)
 
 
 def test_without_commands_the_follower_keeps_its_motion() -> None:
@@ -156,6 +202,51 @@ def test_an_older_command_that_still_acts_is_not_lost() -> None:
     assert found != predict_shape(estimate(), [], NOW_NS + 100 * MS, 0.1)
 
 
+def test_robots_that_are_predicted_onto_one_point_are_taken_as_they_were_seen() -> None:
+    """The leader drives 0.1 m straight to where the follower stands."""
+    facing = Estimate(
+        **{name: getattr(estimate(0.0, 0.0), name) for name in Estimate.__slots__}
+        | {"rho": 0.1, "alpha2": 0.0, "alpha1": 0.0, "v1": 0.1, "u1": 0.0}
+    )
+    assert predict_shape(facing, [], NOW_NS + 1000 * MS, 0.1) == Shape(0.1, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("alpha2", [0.0, 0.5 * math.pi])
+def test_robots_that_come_to_share_one_coordinate_only_have_a_shape(alpha2: float) -> None:
+    """Both stand; the leader is straight ahead of the follower, or abeam of it."""
+    still = Estimate(
+        **{name: getattr(estimate(0.0, 0.0, alpha2), name) for name in Estimate.__slots__}
+        | {"v1": 0.0, "u1": 0.0}
+    )
+    turning = [SentCommand(NOW_NS, 0.0, 1.0)]
+    found = predict_shape(still, turning, NOW_NS + 100 * MS, 0.0)
+    assert_close(found, Shape(0.3, -1.3, alpha2 - 0.1), 1e-12)
+
+
+@given(commands_sent, st.integers(NOW_NS - 100 * MS, NOW_NS + 250 * MS))
+def test_commands_that_no_prediction_needs_change_none(commands: list[SentCommand], begin_ns: int) -> None:
+    rows, sent = rows_of(SentCommand, 64), EMPTY
+    for command in commands:
+        sent = with_command(rows, sent, command)
+    left = still_needed(rows, sent, begin_ns)
+    late = sight_of(reported(estimate())._replace(capture_ns=begin_ns))
+    for ring in (sent, left):
+        same_bits(
+            predicted(late, rows, ring, begin_ns + 300 * MS, 0.1, 0.0),
+            predicted(late, rows, sent, begin_ns + 300 * MS, 0.1, 0.0),
+        )
+    kept = [load(SentCommand, rows, place(left, rows, k)).from_ns for k in range(left.length)]
+    assert all(from_ns > begin_ns for from_ns in kept[1:])
+
+
+def test_in_full_rows_the_oldest_command_gives_way_and_the_newest_moment_is_there_once() -> None:
+    rows, sent = rows_of(SentCommand, 4), EMPTY
+    for k in (0, 1, 2, 3, 4, 5, 5):
+        sent = with_command(rows, sent, SentCommand(k, 0.1 * len(str(sent)), 0.0))
+    kept = [load(SentCommand, rows, place(sent, rows, k)).from_ns for k in range(sent.length)]
+    assert kept == [2, 3, 4, 5]
+
+
 STEP_NS, AHEAD = 8_333_333, 16
 LIMITS = LeaderLimits(v_eps=0.04, k_v=0.1, k_u=0.7)
 BY_RULE = ProcessNoise.by_rule(LIMITS, 0.5)
@@ -177,8 +268,8 @@ def alpha1_errors(kind: str, front_end: FrontEnd, sigma: float) -> tuple[float, 
     measure = measure_world if front_end is FrontEnd.WORLD else measure_body_from_mocap
     own, noise = FollowerMotion(0.1, 0.2, 2e-3, 1e-2), PoseNoise(sigma, 0.0035)
     of = as_filter(make_estimator(kind, Model(front_end, LIMITS, BY_RULE)))
-    sight = Foresight(LIMITS.k_u, BY_RULE.q_u)
-    pair, ahead, trend = swinging_pair(840), AHEAD * STEP_NS * 1e-9, None
+    sight = Foresight.of(LIMITS.k_u, BY_RULE.q_u)
+    pair, ahead, trend = swinging_pair(840), AHEAD * STEP_NS * 1e-9, NO_TREND
     belief, errors = None, []
     for k, (leader, follower) in enumerate(pair[:-AHEAD]):
         seen = measure(k * STEP_NS, (leader.x, leader.y), follower, noise, own)
@@ -196,7 +287,7 @@ def alpha1_errors(kind: str, front_end: FrontEnd, sigma: float) -> tuple[float, 
     return float(held), float(carried)
 
 
-def heard(sight: Foresight, trend: TurnTrend | None, found: Estimate, ahead: float) -> TurnTrend:
+def heard(sight: Foresight, trend: TurnTrend, found: Estimate, ahead: float) -> TurnTrend:
     return sight.heard(trend, found.capture_ns, found.u1, float(found.covariance[4, 4]), ahead)
 
 

@@ -6,7 +6,8 @@ from itertools import pairwise
 import pytest
 
 from formation.pose import Pose
-from hil.emulator.faults import Pair, faulty, is_active
+from formation.records import load
+from hil.emulator.faults import Fault, Pair, fault_rows, faulty, is_active
 from hil.emulator.node import EmulatorNode
 from hil.errors import UsageError
 from hil.lockstep.run import run_lockstep
@@ -23,7 +24,12 @@ LAST = Pair(Pose(0.9, 2.0, 0.4), Pose(-1.1, 0.0, 2.9))
 
 
 def shown(*faults: FaultSection, t: float = 1.0) -> Pair | None:
-    return faulty(faults, t, PERIOD, PAIR, LAST)
+    frame = faulty(fault_rows(faults), t, PERIOD, PAIR, LAST)
+    return None if frame.lost else frame.pair
+
+
+def fault(at: float, duration: float = 0.0) -> Fault:
+    return load(Fault, fault_rows([FaultSection(kind="swap", at_s=at, duration_s=duration)]), 0)
 
 
 def test_each_fault_does_what_its_name_says() -> None:
@@ -53,8 +59,8 @@ def test_faults_of_one_moment_add_up_in_their_order() -> None:
 @pytest.mark.parametrize("at", [0.0, 0.003, 0.5, 0.999])
 def test_without_duration_it_is_one_frame_and_with_one_all_frames_within(at: float) -> None:
     frames = [k * PERIOD for k in range(300)]
-    assert sum(is_active(FaultSection(kind="swap", at_s=at), t, PERIOD) for t in frames) == 1
-    active = [t for t in frames if is_active(FaultSection(kind="swap", at_s=at, duration_s=0.5), t, PERIOD)]
+    assert sum(is_active(fault(at), t, PERIOD) for t in frames) == 1
+    active = [t for t in frames if is_active(fault(at, 0.5), t, PERIOD)]
     assert at <= active[0] < at + PERIOD
     assert active[-1] < at + 0.5
 

@@ -99,12 +99,12 @@ def test_a_stop_stops_both_and_for_good() -> None:
     state, sent = told([(1000, STOP), (1500, command(0.2, 1.0)), (3000, TICK)], state=state)
     last = truths(sent)[-1]
     assert (last.v1, last.u1, last.v2, last.u2) == pytest.approx((0.0, 0.0, 0.0, 0.0), abs=1e-6)
-    assert state.stopped
+    assert state.plant.stopped
 
 
 def test_any_bytes_on_the_stop_topic_stop() -> None:
     state, _ = told([(10, event) for event in READY] + [(500, Event(topics.STOP, b"\x01\x02"))])
-    assert state.stopped
+    assert state.plant.stopped
 
 
 @given(st.lists(st.integers(0, 400_000), max_size=60))
@@ -139,9 +139,10 @@ def test_frames_leave_after_their_latency_and_carry_their_capture_time() -> None
 def test_lost_frames_are_counted_and_their_truth_is_not_lost() -> None:
     node = EmulatorNode(load_scenario("turtlebot3", ["mocap.loss=0.3", "mocap.latency_s=0"]))
     state, sent = told([(2000, TICK)], node)
-    assert len(truths(sent)) == state.frames
-    assert len(frames(sent)) == state.frames - state.lost
-    assert 0.2 < state.lost / state.frames < 0.4
+    world = state.plant.world()
+    assert len(truths(sent)) == world.frames
+    assert len(frames(sent)) == world.frames - world.lost
+    assert 0.2 < world.lost / world.frames < 0.4
 
 
 def test_odometry_tells_what_the_wheels_do_and_nothing_while_they_stand() -> None:
@@ -160,10 +161,11 @@ def test_odometry_tells_what_the_wheels_do_and_nothing_while_they_stand() -> Non
 @settings(deadline=None, max_examples=40)
 def test_garbage_is_counted_and_moves_nothing(topic: str, payload: bytes) -> None:
     before, _ = told([(10, READY[0])])
+    goal = before.robots[1].goal
     after, _ = told([(20, Event(topic, payload))], state=before)
-    assert after.robots[1].command == before.robots[1].command
+    assert after.robots[1].goal == goal
     if topic != topics.STOP:
-        assert not after.stopped
+        assert not after.plant.stopped
 
 
 def test_garbage_on_the_command_topic_is_counted() -> None:
@@ -174,11 +176,11 @@ def test_garbage_on_the_command_topic_is_counted() -> None:
 
 def test_a_command_that_is_not_finite_stops_the_follower() -> None:
     state, _ = told([(10, command(0.2, 0.5)), (20, command(math.nan, 0.5))])
-    assert (state.robots[1].command.v, state.robots[1].command.u) == (0.0, 0.0)
+    assert (state.robots[1].goal.v, state.robots[1].goal.u) == (0.0, 0.0)
 
 
 def test_twist_without_a_stamp_drives_too() -> None:
     node = EmulatorNode(load_scenario("turtlebot3", ["controller.command_type=Twist"]))
     twist = msg.Twist(linear=msg.Vector3(x=0.1, y=0.0, z=0.0), angular=msg.Vector3(x=0.0, y=0.0, z=0.3))
     state, _ = told([(10, Event(node.topics.cmd_vel, encode(twist)))], node)
-    assert (state.robots[1].command.v, state.robots[1].command.u) == pytest.approx((0.1, 0.3))
+    assert (state.robots[1].goal.v, state.robots[1].goal.u) == pytest.approx((0.1, 0.3))

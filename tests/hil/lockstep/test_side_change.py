@@ -41,19 +41,19 @@ def order(word: str) -> bytes:
 
 
 def test_the_last_order_counts() -> None:
-    assert told(GENTLE, order("left")).keeping.ordered is Side.LEFT
-    assert told(GENTLE, order("left"), order("right")).keeping.ordered is Side.RIGHT
+    assert told(GENTLE, order("left")).station.ordered is Side.LEFT
+    assert told(GENTLE, order("left"), order("right")).station.ordered is Side.RIGHT
 
 
 def test_what_is_no_side_is_refused_and_counted() -> None:
     state = told(GENTLE, order("left"), order("starboard"), b"\x00\x01\x00", order("Left"))
-    assert state.keeping.ordered is Side.LEFT
+    assert state.station.ordered is Side.LEFT
     assert dict(state.refused) == {"unknown_side": 2, "malformed": 1}
 
 
 def test_beside_a_leader_that_may_turn_too_hard_no_change_is_begun() -> None:
     state = told(HARD, order("right"), order("left"))
-    assert state.keeping.ordered is Side.RIGHT
+    assert state.station.ordered is Side.RIGHT
     assert dict(state.refused) == {"unsafe_side_change": 1}
 
 

@@ -12,7 +12,7 @@ import pytest
 from hil.nodes.estimator import EstimatorNode
 from hil.scenario.files import load_scenario
 
-FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
+FOLDER = Path(__file__).resolve().parents[3] / "benchmarks"
 
 
 def _load() -> Any:

@@ -1,13 +1,13 @@
 from __future__ import annotations
 
 import pytest
+from hil.nodes.leader_filter import leader_filter
 
 from formation.pose import Motion, Pose, advance
 from formation.shape import shape_of
 from hil.emulator.lab_messages import odometry_message
 from hil.errors import UsageError
 from hil.nodes.estimator import EstimatorNode
-from hil.nodes.leader_filter import leader_filter
 from hil.replay.smoothing import ListeningEstimator
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg

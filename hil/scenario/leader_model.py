@@ -1,0 +1,97 @@
+"""What a scenario says of its leader and of how it is estimated: limits, noise, filter, track, own motion."""
+
+from __future__ import annotations
+
+from estimation.filters.belief import Model
+from estimation.filters.estimator import Estimator
+from estimation.filters.estimators import make_estimator, settling
+from estimation.filters.filter import Filter
+from estimation.models.coordinated_turn import LeaderLimits, ProcessNoise
+from estimation.models.measurement import FrontEnd, PoseNoise
+from estimation.own_motion.odometry_history import InputTrust
+from estimation.own_motion.own_track import ODOMETRY_CORRELATION, TRACK_CORRELATION, OwnNoise
+from estimation.tracking.tracker import TrackSettings
+from hil.errors import UsageError
+from hil.scenario.schema import Scenario
+
+
+def leader_limits(scenario: Scenario) -> LeaderLimits:
+    """What is known of the leader."""
+    leader = scenario.leader
+    return LeaderLimits(leader.v_eps, leader.k_v, leader.k_u)
+
+
+def process_noise(scenario: Scenario) -> ProcessNoise:
+    """Noise of the leader's motion, by rule."""
+    given = scenario.estimator
+    return ProcessNoise.by_rule(leader_limits(scenario), given.turn_bandwidth, given.speed_bandwidth)
+
+
+def leader_model(scenario: Scenario) -> Model:
+    """How the leader's state moves, in the frame of the scenario's front end."""
+    given = scenario.estimator
+    correlation = ODOMETRY_CORRELATION if given.own_motion == "odometry" else TRACK_CORRELATION
+    front_end = FrontEnd(given.front_end)
+    return Model(front_end, leader_limits(scenario), process_noise(scenario), input_correlation=correlation)
+
+
+def leader_filter(scenario: Scenario) -> Filter | Estimator:
+    """Estimator of a scenario.
+
+    Raises :class:`UsageError` if it is to have states for the sensor's offsets and cannot.
+    """
+    given, model = scenario.estimator, leader_model(scenario)
+    if not given.bias_states:
+        return make_estimator(given.kind, model, given.difference_cutoff_s)
+    refuse_bias_states(scenario)
+    from estimation.filters.bias_filter import BiasedExtended
+
+    return BiasedExtended(model, given.sigma_range_bias, given.sigma_bearing_bias)
+
+
+def refuse_bias_states(scenario: Scenario) -> None:
+    """Raise :class:`UsageError` if the scenario asks for states of offsets where there are none."""
+    given = scenario.estimator
+    if given.bias_states and (given.kind, given.front_end) != ("ekf", "body"):
+        raise UsageError(
+            f"estimator.bias_states: kind {given.kind!r} on the {given.front_end} front end has none, "
+            "expected 'ekf' on the body front end; set it to false, or take the offsets of: abreast calibrate"
+        )
+
+
+def track_settings(scenario: Scenario) -> TrackSettings:
+    """When a measurement is believed, and when the estimate."""
+    given = scenario.estimator
+    return TrackSettings(
+        gate_probability=given.gate_probability,
+        reacquire_frames=given.reacquire_frames,
+        coast_after=float(given.coast_after_s),
+        lost_after=float(given.lost_after_s),
+        window=float(given.window_s),
+        **settling(given.kind)._asdict(),
+    )
+
+
+def pose_noise(scenario: Scenario) -> PoseNoise:
+    """Noise of a mocap pose, as the estimator is told."""
+    return PoseNoise(float(scenario.estimator.sigma_position), float(scenario.estimator.sigma_heading))
+
+
+def own_noise(scenario: Scenario) -> OwnNoise:
+    """What is known of the follower by its own mocap track."""
+    limits = scenario.controller
+    return OwnNoise(pose_noise(scenario), float(limits.v_max), float(limits.u_max))
+
+
+def input_trust(scenario: Scenario) -> InputTrust:
+    """What is known of the follower's odometry."""
+    given, limits = scenario.estimator, scenario.controller
+    numbers = (
+        given.sigma_v2,
+        given.sigma_u2,
+        given.input_delay_s,
+        given.input_lag_s,
+        limits.v_max,
+        limits.u_max,
+    )
+    return InputTrust(*map(float, numbers))
