@@ -55,6 +55,7 @@ def estimate(v2: float = 0.1, u2: float = 0.4, alpha2: float = 1.2) -> Estimate:
         joint=joint_of(np.eye(5)),
         nis=1.0,
         status=Status.TRACKING,
+        jump=NO_JUMP,
     )
 
 
@@ -205,7 +206,7 @@ def test_an_older_command_that_still_acts_is_not_lost() -> None:
 def test_robots_that_are_predicted_onto_one_point_are_taken_as_they_were_seen() -> None:
     """The leader drives 0.1 m straight to where the follower stands."""
     facing = Estimate(
-        **{name: getattr(estimate(0.0, 0.0), name) for name in Estimate.__slots__}
+        **{name: getattr(estimate(0.0, 0.0), name) for name in Estimate._fields}
         | {"rho": 0.1, "alpha2": 0.0, "alpha1": 0.0, "v1": 0.1, "u1": 0.0}
     )
     assert predict_shape(facing, [], NOW_NS + 1000 * MS, 0.1) == Shape(0.1, 0.0, 0.0)
@@ -215,7 +216,7 @@ def test_robots_that_are_predicted_onto_one_point_are_taken_as_they_were_seen() 
 def test_robots_that_come_to_share_one_coordinate_only_have_a_shape(alpha2: float) -> None:
     """Both stand; the leader is straight ahead of the follower, or abeam of it."""
     still = Estimate(
-        **{name: getattr(estimate(0.0, 0.0, alpha2), name) for name in Estimate.__slots__}
+        **{name: getattr(estimate(0.0, 0.0, alpha2), name) for name in Estimate._fields}
         | {"v1": 0.0, "u1": 0.0}
     )
     turning = [SentCommand(NOW_NS, 0.0, 1.0)]
