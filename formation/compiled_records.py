@@ -111,7 +111,13 @@ def _teach_rows() -> None:
     overload(records.store, inline="always")(
         lambda rows, k, record: lambda rows, k, record: _store(rows, k, record)
     )
+
+    def cut(kind, rows, first, count):
+        itemsize = records.dtype_of(kind.instance_class).itemsize
+        return lambda kind, rows, first, count: span(rows.address + first * itemsize, count)
+
     overload(records.borrowed, inline="always")(borrow)
+    overload(records.part, inline="always")(cut)
     overload(records.size, inline="always")(count)
 
 

@@ -14,7 +14,8 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numba import from_dtype, njit, types
-from numba.extending import overload, overload_method
+from numba.core.typing.templates import make_overload_method_template
+from numba.extending import infer_getattr, overload
 
 from formation import records
 from formation.compile_cache import cache_of, one_at_a_time
@@ -92,4 +93,11 @@ def _teach(marked: Marked) -> None:
         return function if getattr(record.instance_class, name, None) is function else None
 
     method.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]
-    overload_method(types.BaseNamedTuple, name, jit_options=options, strict=False)(method)
+    overload(method, jit_options=options, strict=False)(method)
+    template = make_overload_method_template(types.BaseNamedTuple, name, method, inline="never")
+    infer_getattr(type(name, (template,), {"_resolve": _resolve_unless_field, "_method": template._resolve}))
+
+
+def _resolve_unless_field(template: Any, record: Any, name: str) -> Any:
+    """A method as it is, but for records that have a field of its name."""
+    return None if name in getattr(record, "fields", ()) else template._method(record, name)

@@ -105,7 +105,7 @@ def columns_of(rows: Rows[R]) -> NDArray[np.void]:
 
 def load(kind: type[R], rows: Rows[R], k: int) -> R:
     """The k-th row as a named tuple."""
-    if isinstance(rows, list):
+    if isinstance(rows, list | _ListPart):
         kept: R = rows[k]
         return kept
     made: R = _maker(cast("Any", kind))(columns_of(rows)[k].item())
@@ -114,7 +114,7 @@ def load(kind: type[R], rows: Rows[R], k: int) -> R:
 
 def store(rows: Rows[R], k: int, record: R) -> None:
     """Put a named tuple into the k-th row."""
-    if isinstance(rows, list):
+    if isinstance(rows, list | _ListPart):
         rows[k] = record
     else:
         columns_of(rows)[k] = record
@@ -128,6 +128,29 @@ def borrowed(rows: Rows[R]) -> Rows[R]:
 def size(rows: Rows[R]) -> int:
     """Number of rows."""
     return len(rows)
+
+
+def part(kind: type[R], rows: Rows[R], first: int, count: int) -> Rows[R]:
+    """Some of the rows, of what they hold; changing them changes these."""
+    if isinstance(rows, list):
+        return cast("Rows[R]", _ListPart(rows, first, count))
+    return cast("Rows[R]", columns_of(rows)[first : first + count])
+
+
+class _ListPart:
+    """Part of a list that stands for rows."""
+
+    def __init__(self, kept: list[Any], first: int, count: int) -> None:
+        self._kept, self._first, self._count = kept, first, count
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, k: int) -> Any:
+        return self._kept[self._first + k]
+
+    def __setitem__(self, k: int, record: Any) -> None:
+        self._kept[self._first + k] = record
 
 
 @functools.cache

@@ -1,0 +1,323 @@
+"""The closed loop on a simulated clock: the lab, and for each follower an estimator and a controller.
+
+It is what :class:`hil.lockstep.lockstep.Lockstep` does with the nodes of a run, event by event and to the
+nanosecond, but for the messages in between: the same functions in the same order, so that a run is the same
+to the last bit. What messages of one moment would be is done in the order in which they would be delivered.
+"""
+
+from __future__ import annotations
+
+import math
+
+from controllers.guard import CLOCK_TOLERANCE_NS
+from estimation.models.measurement import PairSeen
+from estimation.own_motion.odometry_history import MotionSample
+from estimation.tracking.prediction import Reported
+from estimation.tracking.track_point import DUPLICATE, LATE
+from estimation.tracking.tracker import COASTING, LOST, newest, status_of
+from formation.kernel import kernel
+from formation.pose import Motion
+from formation.records import load, size, store
+from hil.emulator.mocap import SeenPose
+from hil.emulator.robot import Robot, pose_of
+from hil.emulator.world import (
+    CAPTURE,
+    FRAME,
+    NO_NUMBERS,
+    NO_ROOM,
+    NOTHING,
+    SAMPLE,
+    Happened,
+    Odometry,
+    World,
+    advanced,
+    due_ns,
+    halted,
+)
+from hil.emulator.world import commanded as robot_commanded
+from hil.lockstep.flight import (
+    LANDED,
+    RUNNING,
+    SHORT_OF_NUMBERS,
+    SHORT_OF_ROOM,
+    STUCK,
+    Flight,
+    Follower,
+    KeptCommand,
+    KeptEstimate,
+    Order,
+    Plan,
+    Rooms,
+    TrueFrame,
+    sent_of,
+    tracks_of,
+)
+from hil.nodes import estimator_step
+from hil.nodes.controller_step import (
+    ControlRules,
+    at_time,
+    can_be,
+    commanded,
+    heard_estimate,
+    heard_leader,
+    heard_order,
+    heard_stop,
+)
+from hil.nodes.estimator_step import MOCAP, Rules
+from hil.wire.message_checks import ACCEPTED, place_cause, planar
+from hil.wire.records import Placement
+
+_NS = 1e-9
+_NEVER = 2**62
+_SAME_PLACE = 1e-3
+_ESTIMATOR_TICK_NS = 50_000_000
+_REPORT_NS = 500_000_000
+
+
+@kernel(inline=False)
+def flown(flight: Flight, plan: Plan, rooms: Rooms) -> Flight:
+    """Run on until it is over or lacks something; with that given it goes on where it was."""
+    while flight.stage == RUNNING:
+        due, first = due_ns(flight.world, plan.lab, rooms.lab), -1
+        n = size(rooms.followers)
+        for k in range(n):
+            tick_ns = load(Follower, rooms.followers, k).tick_ns
+            if tick_ns < due:
+                due, first = tick_ns, k
+        for k in range(n):
+            tick_ns = load(Follower, rooms.followers, k).control.next_tick_ns
+            if tick_ns < due:
+                due, first = tick_ns, n + k
+        if due > flight.end_ns:
+            flight = _ended(flight, plan, rooms)
+        elif first < 0:
+            flight = _lab_tick(flight, plan, rooms, due)
+        elif first < n:
+            flight = _estimator_tick(flight, plan, rooms, first, due)
+        else:
+            before = flight.commands
+            flight = _obeyed(_decided(flight, rooms, first - n, due), plan, rooms, before, due)
+    return flight
+
+
+@kernel(inline=False)
+def _ended(flight: Flight, plan: Plan, rooms: Rooms) -> Flight:
+    """What comes when the time is over: the stop after the drive, the end after the stop."""
+    if flight.world.motion_since_ns < 0:
+        return flight._replace(stage=STUCK)
+    if flight.world.stopped:
+        return flight._replace(stage=LANDED)
+    now_ns = flight.end_ns
+    flight = flight._replace(world=halted(flight.world, plan.lab, rooms.lab.robots, now_ns))
+    for k in range(size(rooms.followers)):
+        follower = load(Follower, rooms.followers, k)
+        control = heard_stop(at_time(follower.control, now_ns))
+        store(rooms.followers, k, follower._replace(control=control))
+    first = flight.commands
+    for k in range(size(rooms.followers)):
+        flight = _decided(flight, rooms, k, now_ns)
+    return _obeyed(flight, plan, rooms, first, now_ns)._replace(end_ns=now_ns + plan.after_ns)
+
+
+@kernel(inline=False)
+def _lab_tick(flight: Flight, plan: Plan, rooms: Rooms, now_ns: int) -> Flight:
+    """Everything that is due in the lab now, and what follows from it."""
+    waiting = 0
+    while True:
+        step = advanced(flight.world, plan.lab, rooms.lab, now_ns)
+        happened = step.happened
+        if happened.kind == NO_ROOM:
+            return flight._replace(stage=SHORT_OF_ROOM)
+        if happened.kind == NO_NUMBERS:
+            return flight._replace(stage=SHORT_OF_NUMBERS)
+        if happened.kind == NOTHING:
+            break
+        flight = flight._replace(world=step.world)
+        if happened.kind == CAPTURE:
+            flight = _captured(flight, plan, rooms, happened)
+        elif happened.kind == FRAME:
+            waiting = _frame(plan, rooms, happened, now_ns, waiting)
+        else:
+            _odometry(flight, plan, rooms, happened, now_ns)
+    return _delivered(flight, plan, rooms, waiting, now_ns)
+
+
+@kernel
+def _captured(flight: Flight, plan: Plan, rooms: Rooms, happened: Happened) -> Flight:
+    """Keep the truth of a capture, and pass an operator's orders on."""
+    world, n = flight.world, size(rooms.followers)
+    for k in range(n):
+        ahead, behind = load(Robot, rooms.lab.robots, k), load(Robot, rooms.lab.robots, k + 1)
+        true = TrueFrame(happened.at_ns, pose_of(ahead), pose_of(behind), ahead.motion, behind.motion)
+        store(rooms.truth, happened.number * n + k, true)
+    flight = flight._replace(captures=happened.number + 1)
+    if world.motion_since_ns < 0:
+        return flight
+    if world.motion_since_ns == happened.at_ns:
+        flight = flight._replace(end_ns=happened.at_ns + plan.duration_ns)
+    t = (happened.at_ns - world.motion_since_ns) * _NS
+    while not world.stopped and flight.orders < size(rooms.orders):
+        order = load(Order, rooms.orders, flight.orders)
+        if t < order.at:
+            break
+        follower = load(Follower, rooms.followers, 0)
+        control = at_time(follower.control, happened.at_ns)
+        heard = heard_order(control, load(ControlRules, rooms.control_rules, 0), order.sign)
+        store(rooms.followers, 0, follower._replace(control=heard.state))
+        flight = flight._replace(orders=flight.orders + 1)
+    return flight
+
+
+@kernel(inline=False)
+def _frame(plan: Plan, rooms: Rooms, happened: Happened, now_ns: int, waiting: int) -> int:
+    """A frame has arrived: every estimator looks at its pair; the number of estimates on their way."""
+    n = size(rooms.followers)
+    capture_ns = happened.stamp_ns - plan.offset_ns
+    if capture_ns < 0 or capture_ns > now_ns + CLOCK_TOLERANCE_NS:
+        return waiting
+    for k in range(n):
+        first = happened.slot * (n + 1) + k
+        leader = _placed(load(SeenPose, rooms.lab.seen, first))
+        follower = _placed(load(SeenPose, rooms.lab.seen, first + 1))
+        if place_cause(leader) == ACCEPTED and place_cause(follower) == ACCEPTED:
+            dx, dy = leader.x - follower.x, leader.y - follower.y
+            if math.sqrt(dx * dx + dy * dy) >= _SAME_PLACE:
+                seen = PairSeen(leader.x, leader.y, planar(follower))
+                waiting = _seen(rooms, k, capture_ns, seen, now_ns, waiting)
+    return waiting
+
+
+@kernel
+def _placed(seen: SeenPose) -> Placement:
+    """The whole pose that a frame has of a body."""
+    return Placement(seen.x, seen.y, 0.0, 0.0, 0.0, seen.qz, seen.qw)
+
+
+@kernel(inline=False)
+def _seen(rooms: Rooms, k: int, capture_ns: int, seen: PairSeen, now_ns: int, waiting: int) -> int:
+    follower, rules = load(Follower, rooms.followers, k), load(Rules, rooms.rules, k)
+    tracks = tracks_of(rooms, k)
+    taken = estimator_step.take_frame(follower.known, tracks, rules, capture_ns, seen)
+    is_new = taken.verdict != DUPLICATE and taken.verdict != LATE
+    published_ns = now_ns if is_new else follower.published_ns
+    store(rooms.followers, k, follower._replace(known=taken.known, published_ns=published_ns))
+    if not is_new:
+        return waiting
+    told = estimator_step.estimate(taken.known, tracks.points, rules, now_ns)
+    store(rooms.waiting, waiting, KeptEstimate(k, now_ns, told.estimate))
+    return waiting + 1
+
+
+@kernel(inline=False)
+def _odometry(flight: Flight, plan: Plan, rooms: Rooms, happened: Happened, now_ns: int) -> None:
+    """Odometry has arrived, or was sampled: estimators take theirs, and the leader tells what it drives."""
+    n = size(rooms.followers)
+    if happened.kind != SAMPLE or plan.lab.odometry.delay == 0.0:
+        for k in range(n):
+            told = load(Odometry, rooms.lab.odometry, happened.slot * (n + 1) + k + 1)
+            sample = MotionSample(happened.stamp_ns, told.motion.v, told.motion.u)
+            follower = load(Follower, rooms.followers, k)
+            tracks, rules = tracks_of(rooms, k), load(Rules, rooms.rules, k)
+            known = estimator_step.take_odometry(follower.known, tracks, rules, sample)
+            store(rooms.followers, k, follower._replace(known=known))
+    if happened.kind == SAMPLE:
+        u1 = load(Robot, rooms.lab.robots, 0).goal.u
+        follower = load(Follower, rooms.followers, 0)
+        store(rooms.followers, 0, follower._replace(control=heard_leader(follower.control, u1)))
+
+
+@kernel(inline=False)
+def _delivered(flight: Flight, plan: Plan, rooms: Rooms, waiting: int, now_ns: int) -> Flight:
+    """Estimates reach their controllers, whose commands reach the robots."""
+    first = flight.commands
+    for k in range(waiting):
+        flight = _told(flight, plan, rooms, load(KeptEstimate, rooms.waiting, k), now_ns)
+    return _obeyed(flight, plan, rooms, first, now_ns)
+
+
+@kernel
+def _told(flight: Flight, plan: Plan, rooms: Rooms, kept: KeptEstimate, now_ns: int) -> Flight:
+    """An estimate reaches its controller: it is kept if it is to be judged, and leads to a command."""
+    since_ns, judged_ns = flight.world.motion_since_ns, plan.judged_from_ns
+    e = kept.estimate
+    if judged_ns < 0 or (since_ns >= 0 and e.capture_ns >= since_ns + judged_ns):
+        store(rooms.estimates, flight.estimates, kept)
+        flight = flight._replace(estimates=flight.estimates + 1)
+    follower = load(Follower, rooms.followers, kept.follower)
+    control, rules = at_time(follower.control, now_ns), load(ControlRules, rooms.control_rules, kept.follower)
+    reported = Reported(
+        e.capture_ns, e.measured_ns, e.rho, e.alpha2, e.v1, e.alpha1, e.u1, e.joint.u_u, e.v2, e.u2
+    )
+    if not can_be(reported, now_ns):
+        store(rooms.followers, kept.follower, follower._replace(control=control))
+        return flight
+    control = heard_estimate(control, rules, reported, e.status, now_ns)
+    store(rooms.followers, kept.follower, follower._replace(control=control))
+    return _decided(flight, rooms, kept.follower, now_ns)
+
+
+@kernel(inline=False)
+def _decided(flight: Flight, rooms: Rooms, k: int, now_ns: int) -> Flight:
+    """The k-th controller decides on a command, which is on its way then."""
+    follower, rules = load(Follower, rooms.followers, k), load(ControlRules, rooms.control_rules, k)
+    controlled = commanded(at_time(follower.control, now_ns), rules, sent_of(rooms, k), now_ns)
+    well, report_ns = follower.controller_well, follower.control_report_ns
+    if not now_ns < report_ns <= now_ns + _REPORT_NS:
+        report_ns = now_ns + _REPORT_NS
+        well = well or controlled.state.heard
+    follower = follower._replace(control=controlled.state, control_report_ns=report_ns, controller_well=well)
+    store(rooms.followers, k, follower)
+    store(rooms.commands, flight.commands, KeptCommand(k, now_ns, controlled.command))
+    return flight._replace(commands=flight.commands + 1)
+
+
+@kernel(inline=False)
+def _obeyed(flight: Flight, plan: Plan, rooms: Rooms, first: int, now_ns: int) -> Flight:
+    """Commands from the ``first`` on reach their robots, and whoever follows those."""
+    world = flight.world
+    for number in range(first, flight.commands):
+        sent = load(KeptCommand, rooms.commands, number)
+        k, wanted = sent.follower, Motion(sent.command.v, sent.command.u)
+        world = robot_commanded(world, plan.lab, rooms.lab.robots, k + 1, wanted, now_ns)
+        store(rooms.followers, k, load(Follower, rooms.followers, k)._replace(commanded=True))
+        if k + 1 < size(rooms.followers):
+            behind = load(Follower, rooms.followers, k + 1)
+            control = heard_leader(behind.control, sent.command.u)
+            store(rooms.followers, k + 1, behind._replace(control=control))
+    return flight._replace(world=_readied(world, rooms))
+
+
+@kernel(inline=False)
+def _estimator_tick(flight: Flight, plan: Plan, rooms: Rooms, k: int, now_ns: int) -> Flight:
+    """Speak up while measurements are missing, and report on the node itself."""
+    follower, rules = load(Follower, rooms.followers, k), load(Rules, rooms.rules, k)
+    known, waiting = follower.known, 0
+    tracks = tracks_of(rooms, k)
+    if known.track.length > 0:
+        status = status_of(newest(tracks.points, known.track), now_ns, rules.settings)
+        silent = (now_ns - follower.published_ns) * 2 > _ESTIMATOR_TICK_NS
+        missing = status in (COASTING, LOST)
+        if missing and silent:
+            told = estimator_step.estimate(known, tracks.points, rules, now_ns)
+            store(rooms.waiting, 0, KeptEstimate(k, now_ns, told.estimate))
+            waiting = 1
+            follower = follower._replace(published_ns=now_ns)
+    if not now_ns < follower.report_ns <= now_ns + _REPORT_NS:
+        moving = known.own.length if rules.source == MOCAP else known.odometry.length
+        well = follower.estimator_well or (known.track.length > 0 and moving > 0)
+        follower = follower._replace(report_ns=now_ns + _REPORT_NS, estimator_well=well)
+    store(rooms.followers, k, follower._replace(tick_ns=now_ns + _ESTIMATOR_TICK_NS))
+    flight = _delivered(flight, plan, rooms, waiting, now_ns)
+    return flight._replace(world=_readied(flight.world, rooms))
+
+
+@kernel
+def _readied(world: World, rooms: Rooms) -> World:
+    """World in which the leader may set off, once all are well and every robot has had a command."""
+    if world.ready:
+        return world
+    for k in range(size(rooms.followers)):
+        f = load(Follower, rooms.followers, k)
+        if not (f.estimator_well and f.controller_well and f.commanded):
+            return world
+    return world._replace(ready=True)
