@@ -151,17 +151,17 @@ def smooth_drive(seed: int, frames: int) -> list[Sent]:
 
 
 def rough_drive(seed: int, sightings: bool) -> list[Sent]:
-    """All that can go wrong in five seconds: faults of mocap, gaps, and messages late, twice or too late."""
+    """All that can go wrong in four seconds: faults of mocap, gaps, and messages late, twice or too late."""
     pair, sent = Pair(seed), list[Sent]()
     random = pair.random
     frozen, freezing = pair.seen(), 0
-    for k in range(600):
+    for k in range(470):
         pair.step()
         seen = pair.seen()
         if freezing > 0:
             freezing -= 1
             seen = frozen if freezing > 4 else seen._replace(leader_x=frozen.leader_x, leader_y=frozen.leader_y)
-        elif k in (200, 330):
+        elif k in (200, 450):
             frozen, freezing = seen, 12
         own = seen.follower
         fault = random.choice(["", "leader", "follower", "flip", "swap"], p=[0.92, 0.02, 0.02, 0.02, 0.02])
@@ -173,12 +173,12 @@ def rough_drive(seed: int, sightings: bool) -> list[Sent]:
             seen = seen._replace(follower=own._replace(theta=own.theta + math.pi))
         elif fault == "swap":
             seen = PairSeen(own.x, own.y, Pose(seen.leader_x, seen.leader_y, 1.0))
-        if k >= 260:  # a step that stays
+        if k >= 240:  # a step that stays
             seen = seen._replace(leader_x=seen.leader_x + 0.03)
         if k % 4 == 0 and not 100 <= k < 130:
             late = random.exponential(20e6) if random.random() < 0.5 else 0.0
             sent.append(Sent(pair.at_ns + late, pair.sample()))
-        if 140 <= k < 160 or 420 <= k < 560:  # short of frames for a while, and then for too long
+        if 140 <= k < 160 or 300 <= k < 440:  # short of frames for a while, and then for too long
             continue
         message: Message = Shown(pair.at_ns, seen)
         if sightings and random.random() < 0.2:
@@ -258,8 +258,42 @@ def test_the_order_of_delivery_does_not_matter_to_the_last_bit(
         point.measurement.capture_ns for point in straight.track()
     ]
     assert other.odometry() == straight.odometry()
-    # The oldest points may rest on what has been forgotten.
     same_bits(tuple(other.own_track()), tuple(straight.own_track()))
     same_bits(tuple(other.track()), tuple(straight.track()))
-    same_bits(other.told(sent[-1].message.stamp_ns if False else round(sent[-1].arrives_ns)),
-              straight.told(round(sent[-1].arrives_ns)))
+    now_ns = round(sent[-1].arrives_ns)
+    same_bits(other.told(now_ns), straight.told(now_ns))
+
+
+@pytest.mark.parametrize("room", [2, 4, 16])
+@pytest.mark.parametrize(("kind", "front_end", "source"), SETUPS, ids=SETUP_IDS)
+def test_more_than_there_is_room_for_shortens_the_window_and_nothing_else(
+    kind: Kind, front_end: FrontEnd, source: int, room: int
+) -> None:
+    fixed, sent = rules(kind, front_end, source)._replace(reprocesses=False), smooth_drive(3, 120)
+    tight, roomy = delivered(fixed, sent, room), delivered(fixed, sent)
+    assert len(tight.track()) == room
+    same_bits(tuple(tight.track()), tuple(roomy.track()[-room:]))
+    if source != ODOMETRY:
+        same_bits(tuple(tight.own_track()), tuple(roomy.own_track()[-room:]))
+
+
+@pytest.mark.parametrize("room", [1, 2, 8, 16])
+@pytest.mark.parametrize(("kind", "front_end", "source"), SETUPS, ids=SETUP_IDS)
+def test_with_little_room_nothing_breaks_whatever_comes(
+    kind: Kind, front_end: FrontEnd, source: int, room: int
+) -> None:
+    fixed = rules(kind, front_end, source)
+    estimator = Estimator(fixed, room=room)
+    for sent in rough_drive(room, front_end is FrontEnd.BODY):
+        before = [point.measurement.capture_ns for point in estimator.track()]
+        outcome = estimator.take(sent.message)
+        after = [point.measurement.capture_ns for point in estimator.track()]
+        if outcome is not None and outcome.verdict in (Verdict.LATE, Verdict.DUPLICATE):
+            assert after == before
+        own = [point.capture_ns for point in estimator.own_track()]
+        for times in (after, own, [sample.stamp_ns for sample in estimator.odometry()]):
+            assert len(times) <= room
+            assert times == sorted(set(times))
+        if outcome is not None:
+            told, _ = estimator.told(round(sent.arrives_ns))
+            assert all(map(math.isfinite, (*told[:11], *told.joint)))
