@@ -4,7 +4,7 @@
 
 The pair of the ``turtlebot3`` scenario at 120 Hz drives on undisturbed, and what mocap shows of it is spoilt
 once, at a random instant, for a random time, on a random body. Frames go through the estimator's pure core
-(tracker, estimate, live bound) with noise, odometry and latency of the scenario. Printed for each fault:
+(its step, estimate, live bound) with noise, odometry and latency of the scenario. Printed for each fault:
 estimates with status TRACKING, how many of these have rho_dot, alpha2_dot, v1 or alpha1 more than five of
 their own standard deviations off the truth, how many v1 or alpha1 outside the extended bound that goes out
 with them, frames rejected, and how long after the fault's end it takes until TRACKING: median, p99, maximum,
@@ -22,6 +22,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal, cast
 
 import numpy as np
 
@@ -29,18 +30,17 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from controllers.laws import independent
 from controllers.limits import Limits
-from estimation.models.measurement import FrontEnd, measure_body_from_mocap, measure_world
-from estimation.own_motion.odometry_history import History, MotionSample, follower_motion, remember
-from estimation.tracking.estimate import Estimate, estimate_at
-from estimation.tracking.follower_check import NO_DOUBT
-from estimation.tracking.track import Track
-from estimation.tracking.track_point import Verdict
+from estimation.models.measurement import FrontEnd, PairSeen
+from estimation.own_motion.odometry_history import MotionSample
+from estimation.tracking.estimate import Estimate
+from estimation.tracking.track_point import GATED, NO_JUMP
 from estimation.tracking.tracker import Status
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
 from formation.shape import Shape, follower_pose, shape_of, shape_rates
 from hil.emulator.faults import Pair, fault_rows, faulty
 from hil.nodes.estimator import EstimatorNode
+from hil.nodes.estimator_memory import EstimatorMemory
 from hil.scenario.files import load_scenario
 from hil.scenario.parts import gains, leader_program
 from hil.scenario.schema import FaultSection, Scenario
@@ -56,18 +56,19 @@ VARIETY = 0.5
 STAYS = 1e6
 """Duration [s] of a step that stays; what follows is judged for the time of doubt and a second more."""
 
+Body = Literal["leader", "follower", "both"]
 Make = Callable[[np.random.Generator, float], FaultSection]
 
 
 @dataclass(frozen=True)
 class Moment:
-    """Truth at one capture: the pair and how it moves; what was shown without fault; odometry so far."""
+    """Truth at one capture: the pair and how it moves; what was shown without fault; odometry heard since."""
 
     pair: Pair
     leader: Motion
     follower: Motion
     shown: Pair
-    history: History
+    heard: list[MotionSample]
 
 
 @dataclass
@@ -97,11 +98,12 @@ def drive(scenario: Scenario, generator: np.random.Generator, frames: int) -> li
     """A pair abreast, from a random instant of the leader's program on, and what is measured of it."""
     program, law, robot = leader_program(scenario), gains(scenario), scenario.robot
     limits, begin = Limits(robot.v_max, robot.u_max), generator.uniform(0.0, 60.0)
-    leader = Pose(*generator.uniform(-2.0, 2.0, 2).tolist(), generator.uniform(-math.pi, math.pi))
+    x, y, theta = generator.uniform([-2.0, -2.0, -math.pi], [2.0, 2.0, math.pi]).tolist()
+    leader = Pose(x, y, theta)
     rho = scenario.formation.rho_0 * generator.uniform(0.8, 1.3)
     follower = follower_pose(Shape(rho, -math.pi / 2 + generator.normal(0.0, 0.2), math.pi / 2), leader)
     moments: list[Moment] = []
-    history: History = ()
+    heard: list[MotionSample] = []
     settle = 120
     for k in range(-settle, frames):
         driven = program(begin + k * PERIOD)
@@ -113,10 +115,11 @@ def drive(scenario: Scenario, generator: np.random.Generator, frames: int) -> li
         if k % ODOMETRY_EVERY == 0:
             v, u = own.v + generator.normal(0.0, robot.odometry_sigma_v), own.u
             u += generator.normal(0.0, robot.odometry_sigma_u)
-            history = remember(history, MotionSample((k + settle) * PERIOD_NS, v, u), 1.0)
+            heard.append(MotionSample((k + settle) * PERIOD_NS, v, u))
         if k >= 0:
             shown = Pair(noisy(leader, scenario, generator), noisy(follower, scenario, generator))
-            moments.append(Moment(Pair(leader, follower), driven, own, shown, history))
+            moments.append(Moment(Pair(leader, follower), driven, own, shown, heard))
+            heard = []
         leader = advance(leader, driven.v, driven.u, PERIOD)
         follower = advance(follower, own.v, own.u, PERIOD)
     return moments
@@ -153,33 +156,32 @@ def inject(
     stays = fault is not None and fault.duration_s == STAYS
     at = settling if fault is None else fault.at_s
     end = at if fault is None or stays else at + max(fault.duration_s, PERIOD)
-    doubted = end + node.tracker.settings.doubt_for
+    doubted = end + node.rules.settings.doubt_for
     until = doubted + 1.0 if stays else end + after
-    track: Track = ()
+    memory = EstimatorMemory(node.rules)
     last: Pair | None = None
     back = math.inf
     for k, moment in enumerate(drive(node.scenario, generator, math.ceil(until / PERIOD))):
         t, capture_ns = k * PERIOD, (k + 120) * PERIOD_NS
+        for sample in moment.heard:
+            memory.take_odometry(sample)
         faults = fault_rows([] if fault is None else [fault])
         frame = faulty(faults, t, PERIOD, moment.shown, last or moment.shown)
         if frame.lost:
             continue
         last = shown = frame.pair
-        motion = follower_motion(moment.history, capture_ns, node.source.trust)
-        measure = measure_world if node.front_end is FrontEnd.WORLD else measure_body_from_mocap
-        leader = (shown.leader.x, shown.leader.y)
-        track, verdict = node.tracker.add(
-            track, measure(capture_ns, leader, shown.follower, node.pose_noise, motion)
-        )
-        status = node.tracker.status(track, capture_ns)
+        seen = PairSeen(shown.leader.x, shown.leader.y, shown.follower)
+        outcome, told = memory.take_frame(capture_ns, seen), memory.estimate(capture_ns)
+        assert told is not None
+        found = told.estimate
         score.frames += 1
-        score.rejected += verdict is Verdict.GATED
-        if t < settling or status is not Status.TRACKING:
+        score.rejected += outcome.verdict == GATED
+        if t < settling or found.status != Status.TRACKING:
             continue
         if t >= end - 1e-9:
             back = min(back, t - end)
-        pair, found = moment.pair, estimate_at(track[-1], status)
-        if stays and fault is not None and t > doubted and found.doubt is NO_DOUBT:
+        pair = moment.pair
+        if stays and fault is not None and t > doubted and found.jump == NO_JUMP:
             pair = faulty(fault_rows([fault]), t, PERIOD, pair, pair).pair
         errors = errors_of(found, pair, moment.leader, moment.follower)
         sd = np.sqrt(np.diagonal(found.covariance)).tolist()
@@ -196,15 +198,15 @@ def _offset(generator: np.random.Generator, size: float) -> tuple[float, float]:
     return (size * math.cos(angle), size * math.sin(angle))
 
 
-def _body(generator: np.random.Generator) -> str:
-    return str(generator.choice(["leader", "follower"]))
+def _body(generator: np.random.Generator) -> Body:
+    return cast("Body", str(generator.choice(["leader", "follower"])))
 
 
 def _log_uniform(generator: np.random.Generator, low: float, high: float) -> float:
     return float(math.exp(generator.uniform(math.log(low), math.log(high))))
 
 
-def _outlier(body: str) -> Make:
+def _outlier(body: Body) -> Make:
     return lambda g, at: FaultSection(
         kind="step", at_s=at, body=body, offset=_offset(g, _log_uniform(g, 1e-3, 1.0))
     )
@@ -215,14 +217,14 @@ def _turned_once(g: np.random.Generator, at: float) -> FaultSection:
     return FaultSection(kind="turn", at_s=at, body="follower", angle=angle)
 
 
-def _flip(body: str) -> Make:
+def _flip(body: Body) -> Make:
     return lambda g, at: FaultSection(
         kind="turn", at_s=at, body=body, duration_s=_log_uniform(g, PERIOD, 1.0)
     )
 
 
 def _frozen(g: np.random.Generator, at: float) -> FaultSection:
-    body = str(g.choice(["leader", "follower", "both"]))
+    body = cast("Body", str(g.choice(["leader", "follower", "both"])))
     return FaultSection(kind="freeze", at_s=at, body=body, duration_s=_log_uniform(g, 2 * PERIOD, 2.0))
 
 

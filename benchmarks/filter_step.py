@@ -1,12 +1,12 @@
-"""What one step of a filter costs from Python: the compiled filters against filterpy's, interleaved.
+"""What one step of a filter costs, compiled and from Python, against filterpy's, interleaved.
 
     python benchmarks/filter_step.py [--rounds 200]
 
-A step is what a track does with a measurement, through the interface of all estimators: from belief, motion
-and measurement to a new belief. filterpy's takes its two calls, predict and update; the compiled one is a
-single call that also gates and hands out the NIS. ``kernel`` is the same step without the interface,
-``belief`` what it costs to build the belief that a step hands out. Medians over
-the rounds; the ratio is the median of the ratios within a round, so that a busy machine slows both sides.
+A step is what a track does with a measurement: from belief, motion and measurement to a new belief, with
+gate and NIS. ``loop``: in a compiled loop, as the whole estimator runs. ``entry``: one call from Python that
+changes rows in place. filterpy's takes its two calls, predict and update, and has neither gate nor NIS.
+Processor time, so that a busy machine counts little; medians over the rounds, a ratio being the median of
+the ratios within a round.
 """
 
 from __future__ import annotations
@@ -22,83 +22,92 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from estimation.filters import kernels
 from estimation.filters.belief import Belief, Model
-from estimation.filters.estimators import make_estimator
+from estimation.filters.entries import step
+from estimation.filters.estimator import Estimator
+from estimation.filters.filter import Filter, Kind, filter_of
+from estimation.filters.gaussian import Gaussian
+from estimation.filters.kalman import ExtendedFilter, UnscentedFilter
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, Measurement
+from formation.kernel import entry
+from formation.records import Rows, load, row_of, store
 
 DT = 1.0 / 120.0
 LIMITS = LeaderLimits(v_eps=0.04, k_v=0.22, k_u=0.7)
 WORLD = Model(FrontEnd.WORLD, LIMITS, ProcessNoise.by_rule(LIMITS, 0.5))
 FOLLOWER = FollowerMotion(0.1, 0.2, 5e-3, 3e-2)
-SEEN = Measurement(0, np.array([0.3, 0.1]), 1e-6 * np.eye(2), FOLLOWER)
+SEEN = Measurement.at(0, np.array([0.3, 0.1]), 1e-6 * np.eye(2), FOLLOWER)
 GATE = 18.4
-TARGETS = {"ekf": 20.0, "ukf": 50.0}
+LOOPS, CALLS, PEERS = 2000, 200, 10
+"""Steps of each kind in a round."""
+WANTED = {Kind.EKF: (500.0, 60.0), Kind.UKF: (250.0, 100.0)}
+"""Ratios that are wanted, in a loop and by calls."""
 
-Step = Callable[[], object]
+
+@entry
+def steps(
+    beliefs: Rows[Gaussian],
+    measurements: Rows[Measurement],
+    filters: Rows[Filter],
+    dt: float,
+    gate: float,
+    count: int,
+) -> float:
+    """So many steps of a belief with ever the same measurement."""
+    belief, estimator = load(Gaussian, beliefs, 0), load(Filter, filters, 0)
+    measurement, nis = load(Measurement, measurements, 0), 0.0
+    for _ in range(count):
+        stepped = estimator.step(belief, dt, measurement.motion, measurement, gate)
+        belief, nis = stepped.belief, stepped.nis
+    store(beliefs, 0, belief)
+    return nis
 
 
-def settled(model: Model) -> Belief:
+def settled(peer: Estimator) -> Belief:
     """A belief as it is in mid-run."""
-    estimator = make_estimator("ekf", model)
-    belief = estimator.start(SEEN)
+    belief = peer.start(SEEN)
     for _ in range(60):
-        belief = estimator.update(estimator.predict(belief, DT, FOLLOWER), SEEN)
+        belief = peer.update(peer.predict(belief, DT, FOLLOWER), SEEN)
     return belief
 
 
-def step_of(name: str, model: Model, belief: Belief) -> Step:
-    estimator = make_estimator(name, model)
-    return lambda: estimator.step(belief, DT, FOLLOWER, SEEN, GATE)
-
-
-def step_of_peer(name: str, model: Model, belief: Belief) -> Step:
-    estimator = make_estimator(f"{name}-filterpy", model)
-    return lambda: estimator.update(estimator.predict(belief, DT, FOLLOWER), SEEN)
-
-
-def kernel_step(name: str, model: Model, belief: Belief) -> Step:
-    kernel = kernels.extended_step if name == "ekf" else kernels.unscented_step
-    own = FOLLOWER if model.front_end is FrontEnd.BODY else FollowerMotion(0.0, 0.0, 0.0, 0.0)
-    given, drive = model.noise, (own.v2, own.u2, own.sd_v2, own.sd_u2)
-    noise = np.array([given.q_v, given.q_u, given.v_eps, given.q_start, model.input_correlation])
-    before, spread, seen, scatter = belief.mean, belief.covariance, SEEN.position, SEEN.covariance
-    after, joint = np.empty(5), np.empty((5, 5))
-    return lambda: kernel(before, spread, DT, *drive, noise, seen, scatter, GATE, after, joint)
-
-
-def new_belief(_belief: Belief) -> Step:
-    return lambda: Belief(np.empty(5), np.empty((5, 5)))
-
-
-def seconds_each(step: Step, count: int) -> float:
-    begin = time.perf_counter()
+def seconds(work: Callable[[], object], count: int = 1) -> float:
+    begin = time.thread_time_ns()
     for _ in range(count):
-        step()
-    return (time.perf_counter() - begin) / count
+        work()
+    return 1e-9 * (time.thread_time_ns() - begin)
+
+
+def timed(kind: Kind, model: Model, rounds: int) -> np.ndarray:
+    """Seconds (rounds, 3) of a step of filterpy's, in the loop and by a call."""
+    peer = ExtendedFilter(model) if kind is Kind.EKF else UnscentedFilter(model)
+    belief = settled(peer)
+    beliefs, seen, filters = row_of(belief.gaussian), row_of(SEEN), row_of(filter_of(kind, model))
+    took = [
+        (
+            seconds(lambda: peer.update(peer.predict(belief, DT, FOLLOWER), SEEN), PEERS) / PEERS,
+            seconds(lambda: steps(beliefs, seen, filters, DT, GATE, LOOPS)) / LOOPS,
+            seconds(lambda: step(beliefs, seen, filters, DT, GATE), CALLS) / CALLS,
+        )
+        for _ in range(rounds)
+    ]
+    return np.array(took)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--rounds", type=int, default=200)
     rounds = parser.parse_args().rounds
-    print("filter  front   filterpy  compiled    kernel    belief   ratio  target  ratio of kernel")
+    print("filter  front    filterpy       loop      entry  ratio of loop  wanted  ratio of entry  wanted")
     for model in (WORLD, replace(WORLD, front_end=FrontEnd.BODY)):
-        belief = settled(model)
-        for name, target in TARGETS.items():
-            timed = [
-                (step_of_peer(name, model, belief), 10),
-                (step_of(name, model, belief), 100),
-                (kernel_step(name, model, belief), 100),
-                (new_belief(belief), 100),
-            ]
-            took = np.array([[seconds_each(step, count) for step, count in timed] for _ in range(rounds)])
-            times = "  ".join(f"{1e6 * each:5.1f} us" for each in np.median(took, axis=0))
-            ratio, bare = (float(np.median(took[:, 0] / took[:, k])) for k in (1, 2))
-            print(
-                f"{name:6}  {model.front_end.value:5}  {times}  {ratio:5.1f}x  {target:5.0f}x  {bare:14.1f}x"
-            )
+        for kind, (in_loop, by_call) in WANTED.items():
+            took = timed(kind, model, rounds)
+            peer, loop, call = 1e6 * np.median(took, axis=0)
+            ratios = [float(np.median(took[:, 0] / took[:, k])) for k in (1, 2)]
+            times = f"{peer:6.1f} us  {1e3 * loop:6.1f} ns  {1e3 * call:6.1f} ns"
+            told = f"{ratios[0]:12.0f}x  {in_loop:5.0f}x  {ratios[1]:13.0f}x  {by_call:5.0f}x"
+            print(f"{kind.name.lower():6}  {model.front_end.value:5}  {times}  {told}")
 
 
 if __name__ == "__main__":
