@@ -66,9 +66,7 @@ def test_the_compiled_flock_is_that_of_the_laws(seed: int, law: str, most: int, 
     state = scattered(places, seed, 0.3, 1.0)
     chosen = np.empty((21, most), dtype=np.int64)
     kernels.choose(state, may_follow(places), chosen)
-    flock = kernels.Flock(
-        Gains(MU1, MU2, GAINS.spacing, tilt=tilt).settings(limits), law == "ideal"
-    )
+    flock = kernels.Flock(Gains(MU1, MU2, GAINS.spacing, tilt=tilt).settings(limits), law == "ideal")
     change, told = np.empty((21, 3)), np.empty((4, 21))
     kernels.rates(leader, state, places, chosen, flock, change, told)
     agents = [Pose(*row) for row in state.tolist()]
