@@ -1,15 +1,18 @@
 """Writing MCAP with chunks that end where the caller says.
 
 The ``mcap`` package's own writer ends a chunk by size alone, so whatever is still in memory is lost with the
-process. Here the record layouts are that package's; only what goes into which chunk is decided here.
+process. What goes into which chunk is decided here, and the two records that there are many of are packed
+here, since a log must not cost what it tells of; all other record layouts are that package's.
 Reference: the MCAP format specification, version 0.
 """
 
 from __future__ import annotations
 
 import struct
+import sys
 import zlib
-from collections.abc import Callable, Iterable, Mapping
+from array import array
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import zstandard
 from mcap.data_stream import RecordBuilder
@@ -22,7 +25,6 @@ from mcap.records import (
     Footer,
     Header,
     McapRecord,
-    MessageIndex,
     Metadata,
     MetadataIndex,
     Schema,
@@ -33,7 +35,14 @@ from mcap.records import (
 MAGIC = b"\x89MCAP0\r\n"
 
 _MESSAGE_HEAD = struct.Struct("<BQHIQQ")
-_MESSAGE_FIXED_BYTES = 22
+_pack_head = _MESSAGE_HEAD.pack
+_HEAD_BYTES = _MESSAGE_HEAD.size
+_FIXED_BYTES = 22
+_INDEX_HEAD = struct.Struct("<BQHI")
+_INDEX_FIXED_BYTES = 6
+_PAIR_BYTES = 16
+_MESSAGE = int(Opcode.MESSAGE)
+_LAST_SEQUENCE = 0xFFFFFFFF
 _FOOTER_HEAD = struct.Struct("<BQQQ")
 _FOOTER_BYTES = 20
 
@@ -52,15 +61,12 @@ class ChunkedMcap:
         self._chunks = 0
         self._message_counts: dict[int, int] = {}
         self._span: tuple[int, int] | None = None
-        self._chunk = bytearray()
-        self._chunk_entries: dict[int, list[tuple[int, int]]] = {}
+        # The open chunk: its records in pieces, their size, and by channel log time and offset in turn.
+        self._pieces: list[bytes] = []
+        self._size = 0
+        self._entries: dict[int, list[int]] = {}
         self._compressor = zstandard.ZstdCompressor()
         self._emit(MAGIC + _bytes_of([Header(profile=profile, library=library)]))
-
-    @property
-    def open_chunk_bytes(self) -> int:
-        """Size of the chunk that is still in memory, before compression."""
-        return len(self._chunk)
 
     def add_metadata(self, name: str, entries: Mapping[str, str]) -> None:
         """Write a metadata record at once."""
@@ -72,7 +78,7 @@ class ChunkedMcap:
         """Declare a message type; returns its id."""
         schema = Schema(id=len(self._schemas) + 1, name=name, encoding=encoding, data=data)
         self._schemas.append(schema)
-        self._chunk += _bytes_of([schema])
+        self._put(_bytes_of([schema]))
         return schema.id
 
     def add_channel(self, topic: str, schema_id: int, encoding: str, metadata: Mapping[str, str]) -> int:
@@ -86,33 +92,42 @@ class ChunkedMcap:
         )
         self._channels.append(channel)
         self._message_counts[channel.id] = 0
-        self._chunk += _bytes_of([channel])
+        self._entries[channel.id] = []
+        self._put(_bytes_of([channel]))
         return channel.id
 
-    def add_message(self, channel_id: int, log_ns: int, publish_ns: int, payload: bytes) -> None:
-        """Put a message into the open chunk, with the channel's next sequence number (from 0)."""
-        sequence = self._message_counts[channel_id]
-        head = _MESSAGE_HEAD.pack(
-            Opcode.MESSAGE,
-            _MESSAGE_FIXED_BYTES + len(payload),
-            channel_id,
-            sequence & 0xFFFFFFFF,
-            log_ns,
-            publish_ns,
+    def add_message(self, channel_id: int, log_ns: int, publish_ns: int, payload: bytes) -> int:
+        """Put a message into the open chunk, with the channel's next sequence number (from 0).
+
+        Returns the size [bytes] of the open chunk, before compression.
+        """
+        entries, offset, length = self._entries[channel_id], self._size, len(payload)
+        sequence = self._message_counts[channel_id] + (len(entries) >> 1)
+        head = _pack_head(
+            _MESSAGE, _FIXED_BYTES + length, channel_id, sequence & _LAST_SEQUENCE, log_ns, publish_ns
         )
-        self._chunk_entries.setdefault(channel_id, []).append((log_ns, len(self._chunk)))
-        self._chunk += head
-        self._chunk += payload
-        self._message_counts[channel_id] = sequence + 1
+        entries += (log_ns, offset)
+        self._pieces += (head, payload)
+        self._size = size = offset + _HEAD_BYTES + length
+        return size
+
+    def open_span(self) -> tuple[int, int] | None:
+        """First and last log time in the open chunk; None if it holds no message."""
+        times = [entries[::2] for entries in self._entries.values() if entries]
+        return (min(map(min, times)), max(map(max, times))) if times else None
 
     def close_chunk(self) -> None:
         """End the open chunk and write it with its index; does nothing if it holds no message."""
-        if not self._chunk_entries:
+        span = self.open_span()
+        if span is None:
             return
-        data, entries = bytes(self._chunk), self._chunk_entries
-        self._chunk, self._chunk_entries = bytearray(), {}
-        times = [log_ns for channel_entries in entries.values() for log_ns, _ in channel_entries]
-        first, last = min(times), max(times)
+        first, last = span
+        indexed = {number: entries for number, entries in self._entries.items() if entries}
+        data = b"".join(self._pieces)
+        self._pieces, self._size = [], 0
+        self._entries = {number: [] for number in self._entries}
+        for number, entries in indexed.items():
+            self._message_counts[number] += len(entries) >> 1
         self._span = (min(first, self._span[0]), max(last, self._span[1])) if self._span else (first, last)
         chunk = Chunk(
             compression="zstd",
@@ -122,12 +137,13 @@ class ChunkedMcap:
             uncompressed_crc=zlib.crc32(data),
             uncompressed_size=len(data),
         )
-        written = _bytes_of([chunk])
-        chunk_bytes = len(written)
+        written = [_bytes_of([chunk])]
+        chunk_bytes = end = len(written[0])
         index_offsets: dict[int, int] = {}
-        for channel_id, channel_entries in entries.items():
-            index_offsets[channel_id] = self._offset + len(written)
-            written += _bytes_of([MessageIndex(channel_id=channel_id, records=channel_entries)])
+        for number, entries in indexed.items():
+            index_offsets[number] = self._offset + end
+            written.append(_message_index(number, entries))
+            end += len(written[-1])
         index = ChunkIndex(
             chunk_start_offset=self._offset,
             chunk_length=chunk_bytes,
@@ -137,11 +153,11 @@ class ChunkedMcap:
             message_start_time=first,
             message_end_time=last,
             message_index_offsets=index_offsets,
-            message_index_length=len(written) - chunk_bytes,
+            message_index_length=end - chunk_bytes,
         )
         self._chunk_indexes += _bytes_of([index])
         self._chunks += 1
-        self._emit(written)
+        self._emit(b"".join(written))
 
     def finish(self) -> None:
         """Write what is still in memory, the summary and the end of the file."""
@@ -169,6 +185,10 @@ class ChunkedMcap:
         footer = Footer(summary_start=summary_start, summary_offset_start=offsets_start, summary_crc=crc)
         self._emit(summary + _bytes_of([footer]) + MAGIC)
 
+    def _put(self, record: bytes) -> None:
+        self._pieces.append(record)
+        self._size += len(record)
+
     def _statistics(self) -> Statistics:
         first, last = self._span or (0, 0)
         return Statistics(
@@ -186,6 +206,17 @@ class ChunkedMcap:
     def _emit(self, data: bytes) -> None:
         self._emit_bytes(data)
         self._offset += len(data)
+
+
+def _message_index(channel_id: int, entries: Sequence[int]) -> bytes:
+    """Index of one channel's messages in a chunk; ``entries``: log time and offset of each in turn."""
+    pairs = array("Q", entries)
+    if sys.byteorder == "big":
+        pairs.byteswap()
+    size = _PAIR_BYTES * (len(entries) >> 1)
+    return (
+        _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, _INDEX_FIXED_BYTES + size, channel_id, size) + pairs.tobytes()
+    )
 
 
 def _bytes_of(records: Iterable[McapRecord]) -> bytes:

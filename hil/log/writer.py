@@ -22,21 +22,22 @@ class LogWriter:
     """A log open for writing. Use as a context manager, or call :meth:`close`.
 
     The metadata records (name to entries) come first in the file, so that a log that was cut off has them.
-    Messages reach the operating system at the latest when log time has moved ``flush_every_s`` on; as no
-    clock is looked at, a writer whose messages cease for a while should call :meth:`flush`. Not for use from
-    several threads.
+    No chunk spans ``flush_every_s`` of log time or more: what is in memory reaches the operating system
+    before the first message that far off from any of it is taken. As no clock is looked at, a writer whose
+    messages cease for a while should call :meth:`flush`. Not for use from several threads.
 
     Raises :class:`UsageError` if the file exists or can't be created, and :class:`AbreastError` from any
     method once the disk refuses to take more; what was written before stays recoverable.
     """
 
     def __init__(
-        self, path: Path, metadata: Mapping[str, Mapping[str, str]], flush_every_s: float = 0.1
+        self, path: Path, metadata: Mapping[str, Mapping[str, str]], flush_every_s: float = 0.2
     ) -> None:
         self.path = path
         self.messages = 0
         self._flush_every_ns = round(flush_every_s * 1e9)
-        self._chunk_from_ns: int | None = None
+        # Earliest log time in the open chunk, and the one that it does not reach; equal while it is empty.
+        self._first_ns = self._until_ns = 0
         self._schema_ids: dict[str, int] = {}
         self._channel_ids: dict[tuple[str, str], int] = {}
         self._failed = False
@@ -60,15 +61,10 @@ class LogWriter:
         channel_id = self._channel_ids.get((topic, typename))
         if channel_id is None:
             channel_id = self._declare(topic, typename)
-        self._mcap.add_message(channel_id, log_ns, publish_ns, payload)
+        if not self._first_ns <= log_ns < self._until_ns:
+            self._make_room(log_ns)
         self.messages += 1
-        if self._chunk_from_ns is None:
-            self._chunk_from_ns = log_ns
-        # Log times of different topics need not be in order, so the distance counts, not the sign.
-        if (
-            abs(log_ns - self._chunk_from_ns) >= self._flush_every_ns
-            or self._mcap.open_chunk_bytes >= _CHUNK_LIMIT_BYTES
-        ):
+        if self._mcap.add_message(channel_id, log_ns, publish_ns, payload) >= _CHUNK_LIMIT_BYTES:
             self.flush()
 
     def add_metadata(self, metadata: Mapping[str, Mapping[str, str]]) -> None:
@@ -79,7 +75,7 @@ class LogWriter:
     def flush(self) -> None:
         """Hand everything written so far to the operating system: it then survives a kill of the process."""
         self._mcap.close_chunk()
-        self._chunk_from_ns = None
+        self._first_ns = self._until_ns = 0
 
     def close(self) -> None:
         """Finish the file; further calls do nothing."""
@@ -98,6 +94,18 @@ class LogWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def _make_room(self, log_ns: int) -> None:
+        """Let the open chunk begin earlier for a message, or end, so that it spans no more than it may.
+
+        Log times of different topics need not be in order.
+        """
+        first_ns, last_ns = self._mcap.open_span() or (log_ns, log_ns)
+        if max(last_ns, log_ns) - min(first_ns, log_ns) >= self._flush_every_ns:
+            self.flush()
+            first_ns = log_ns
+        self._first_ns = min(first_ns, log_ns)
+        self._until_ns = self._first_ns + self._flush_every_ns
 
     def _declare(self, topic: str, typename: str) -> int:
         if typename not in self._schema_ids:

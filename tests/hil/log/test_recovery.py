@@ -34,7 +34,7 @@ def sight(number: int) -> bytes:
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("whole") / "run.mcap"
-    with LogWriter(path, METADATA) as log:
+    with LogWriter(path, METADATA, flush_every_s=0.1) as log:
         for number in range(300):
             at = START_NS + number * 4_000_000
             log.write("a" if number % 3 else "b", TYPENAME, sight(number), at, at - 1)
