@@ -11,6 +11,7 @@ import fcntl
 import functools
 import hashlib
 import os
+import pickle
 import re
 import sys
 import tempfile
@@ -137,3 +138,11 @@ class _CacheImpl(caching.CompileResultCacheImpl):
 
 class _Cache(caching.FunctionCache):
     _impl_class = _CacheImpl
+
+    def load_overload(self, signature: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(signature, target_context)
+        except (AttributeError, ImportError, TypeError, EOFError, pickle.UnpicklingError):
+            # It names what is gone by now, a record that was renamed say, or was torn: as if there were none.
+            self.flush()
+            return None

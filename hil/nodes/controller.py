@@ -36,7 +36,7 @@ from hil.wire import topics
 from hil.wire.drive_message import drive_message, read_drive
 from hil.wire.estimate_message import from_message
 from hil.wire.events import Event
-from hil.wire.intake import CLOCK_TOLERANCE_NS
+from hil.wire.message_checks import CLOCK_TOLERANCE_NS
 from hil.wire.messages import MalformedPayloadError, decode_as, header, to_time
 from hil.wire.topics import topics_of
 

@@ -49,8 +49,9 @@ from hil.wire import topics
 from hil.wire.certified_message import certified_message
 from hil.wire.estimate_message import AssumedErrors, to_message
 from hil.wire.events import Event
-from hil.wire.intake import CLOCK_TOLERANCE_NS, RefusedError, read_frame, read_odometry, read_sighting
+from hil.wire.message_checks import CLOCK_TOLERANCE_NS
 from hil.wire.message_types import Consumed
+from hil.wire.reading import RefusedError, read_frame, read_odometry, read_sighting
 from hil.wire.topics import topics_of
 
 NAME = "estimator"

@@ -8,7 +8,8 @@ from estimation.time.clock import Arrival, heard
 from estimation.time.host_time import HostTime, on_host
 from hil.scenario.files import refuse_two_corrections
 from hil.scenario.schema import Scenario
-from hil.wire.intake import CLOCK_TOLERANCE_NS, Frame
+from hil.wire.message_checks import CLOCK_TOLERANCE_NS
+from hil.wire.records import Frame
 
 
 @dataclass(frozen=True, slots=True)

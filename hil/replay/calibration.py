@@ -16,9 +16,10 @@ from hil.log.metadata import IMPORT, mode_of
 from hil.log.reader import Log
 from hil.scenario.schema import Scenario
 from hil.wire import topics
-from hil.wire.intake import RefusedError, Sighting, read_frame, read_sighting
 from hil.wire.message_types import Truth
 from hil.wire.messages import MalformedPayloadError, decode_as, to_ns
+from hil.wire.reading import RefusedError, read_frame, read_sighting
+from hil.wire.records import Sighting
 from hil.wire.topics import Topics, topics_of
 
 Poses = dict[int, tuple[float, float, float, float, float]]

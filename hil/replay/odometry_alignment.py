@@ -13,7 +13,7 @@ from hil.log.reader import Log
 from hil.nodes.frame_time import FrameTime
 from hil.scenario.schema import Scenario
 from hil.wire import topics
-from hil.wire.intake import RefusedError, read_frame, read_odometry
+from hil.wire.reading import RefusedError, read_frame, read_odometry
 from hil.wire.topics import topics_of
 
 

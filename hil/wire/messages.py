@@ -23,6 +23,7 @@ M = TypeVar("M", bound=Message)
 _NS_PER_S = 1_000_000_000
 _LAST_SECOND = 2**31 - 1
 _SEPARATOR = "=" * 80
+_BIG_ENDIAN = b"\x00\x00"
 
 
 class MalformedPayloadError(AbreastError):
@@ -54,6 +55,19 @@ def decode(payload: bytes | memoryview, typename: str, typestore: Typestore | No
         return cast("Message", store.deserialize_cdr(payload, typename))
     except SerdeError as error:
         raise MalformedPayloadError(f"not a {typename}: {error}") from None
+
+
+def in_little_endian(payload: bytes, typename: str) -> bytes:
+    """Return the same message as little-endian CDR, all that kernels read.
+
+    A payload that is so already comes back as it is, and so does one that is not a valid message at all.
+    """
+    if payload[:2] != _BIG_ENDIAN:
+        return payload
+    try:
+        return encode(decode(payload, typename))
+    except MalformedPayloadError:
+        return payload
 
 
 def decode_as(payload: bytes | memoryview, kind: type[M]) -> M:

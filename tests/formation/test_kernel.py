@@ -8,6 +8,7 @@ import os
 import struct
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -144,28 +145,61 @@ print(answer(2.0), sum(answer.stats.cache_hits.values()))
 """
 
 
-def test_an_edit_in_an_imported_kernel_recompiles_and_nothing_else_does(tmp_path: Path) -> None:
-    package = tmp_path / "formation"
+def house_of_a_test(folder: Path, top: str) -> Callable[[str], str]:
+    """A copy of the package with a module ``top`` that is run with what a module below it holds."""
+    package = folder / "formation"
     package.mkdir()
     for source in (ROOT / "formation").glob("*.py"):
         (package / source.name).write_text(source.read_text())
-    (package / "top_of_a_test.py").write_text(TOP)
+    (package / "top_of_a_test.py").write_text(top)
 
-    def run(weight: str) -> str:
-        (package / "leaf_of_a_test.py").write_text(LEAF.format(weight=weight))
+    def run(leaf: str) -> str:
+        (package / "leaf_of_a_test.py").write_text(leaf)
         told = subprocess.run(
             [sys.executable, "-B", "-m", "formation.top_of_a_test"],
-            cwd=tmp_path,
-            env=os.environ | {"PYTHONPATH": str(tmp_path)},
+            cwd=folder,
+            env=os.environ | {"PYTHONPATH": str(folder)},
             capture_output=True,
             text=True,
             check=True,
         )
         return told.stdout.strip()
 
-    assert run("3.0") == "6.0 0"
-    assert run("3.0") == "6.0 1"
-    assert run("5.0") == "10.0 0"
+    return run
+
+
+def test_an_edit_in_an_imported_kernel_recompiles_and_nothing_else_does(tmp_path: Path) -> None:
+    run = house_of_a_test(tmp_path, TOP)
+    assert run(LEAF.format(weight="3.0")) == "6.0 0"
+    assert run(LEAF.format(weight="3.0")) == "6.0 1"
+    assert run(LEAF.format(weight="5.0")) == "10.0 0"
+
+
+RECORD = """from typing import NamedTuple
+from formation.kernel import kernel
+class {name}(NamedTuple):
+    x: float
+    number: int
+Record = {name}
+@kernel
+def made(x: float) -> {name}:
+    return {name}(x, 2)
+"""
+RECORD_TOP = """from __future__ import annotations
+from formation.kernel import entry
+from formation.leaf_of_a_test import Record, made
+@entry
+def answer(x: float) -> Record:
+    return made(x)
+print(answer(2.0), sum(answer.stats.cache_hits.values()))
+"""
+
+
+def test_what_was_kept_with_a_record_that_is_gone_is_compiled_anew(tmp_path: Path) -> None:
+    run = house_of_a_test(tmp_path, RECORD_TOP)
+    assert run(RECORD.format(name="Old")) == "Old(x=2.0, number=2) 0"
+    assert run(RECORD.format(name="New")) == "New(x=2.0, number=2) 0"
+    assert run(RECORD.format(name="New")) == "New(x=2.0, number=2) 1"
 
 
 def test_without_numba_all_is_plain_python() -> None:

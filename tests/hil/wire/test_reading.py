@@ -13,16 +13,9 @@ from formation.angles import wrap
 from formation.pose import Motion, Pose
 from hil.emulator.lab_messages import frame_message, odometry_message
 from hil.wire import message_types as msg
-from hil.wire.intake import (
-    CLOCK_TOLERANCE_NS,
-    FARTHEST,
-    FASTEST,
-    RefusedError,
-    read_frame,
-    read_odometry,
-    read_sighting,
-)
+from hil.wire.message_checks import CLOCK_TOLERANCE_NS, FARTHEST, FASTEST
 from hil.wire.messages import encode, header
+from hil.wire.reading import RefusedError, read_frame, read_odometry, read_sighting
 
 NOW_NS = 1_700_000_000_000_000_000
 STAMP_NS = NOW_NS - 30_000_000

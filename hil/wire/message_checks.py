@@ -1,0 +1,220 @@
+"""Message checks: nothing off the wire is trusted, and what is refused has a cause to count it by."""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+
+from formation.kernel import kernel
+from formation.pose import Pose
+from formation.records import Rows, load
+from hil.wire.records import (
+    Body,
+    CheckedMotion,
+    Frame,
+    FrameHead,
+    Odometry,
+    Placement,
+    RangeAndBearing,
+    ReadEstimate,
+    Sighting,
+    Wanted,
+    is_time,
+    ns_of,
+)
+
+CLOCK_TOLERANCE_NS = 50_000_000
+"""How far in the future a stamp may lie before it is refused: more than this is a wrong clock."""
+
+ANY_TIME_NS = 2**62
+"""Latest stamp for a reader that takes those of the future too."""
+
+FARTHEST = 1e4
+"""Largest coordinate or range [m] that is believed; beyond it the squares of a filter lose their meaning."""
+
+FASTEST = 1e3
+"""Largest speed [m/s] and turn rate [rad/s] of a robot that is believed."""
+
+_UNIT_TOLERANCE = 0.01
+_UPRIGHT = math.cos(math.radians(30.0))
+
+
+class Cause(IntEnum):
+    """Why a message is not used.
+
+    unknown_body: the frame holds strangers only. tilted: z of a body is not up. bad_range: not above zero.
+    """
+
+    ACCEPTED = 0
+    MALFORMED = 1
+    BAD_STAMP = 2
+    UNKNOWN_BODY = 3
+    MISSING_LEADER = 4
+    MISSING_FOLLOWER = 5
+    DUPLICATE_BODY = 6
+    NOT_FINITE = 7
+    OUT_OF_RANGE = 8
+    BAD_QUATERNION = 9
+    TILTED = 10
+    BAD_RANGE = 11
+
+    @property
+    def word(self) -> str:
+        """What it is counted by."""
+        return self.name.lower()
+
+
+ACCEPTED = Cause.ACCEPTED.value
+MALFORMED = Cause.MALFORMED.value
+BAD_STAMP = Cause.BAD_STAMP.value
+UNKNOWN_BODY = Cause.UNKNOWN_BODY.value
+MISSING_LEADER = Cause.MISSING_LEADER.value
+MISSING_FOLLOWER = Cause.MISSING_FOLLOWER.value
+DUPLICATE_BODY = Cause.DUPLICATE_BODY.value
+NOT_FINITE = Cause.NOT_FINITE.value
+OUT_OF_RANGE = Cause.OUT_OF_RANGE.value
+BAD_QUATERNION = Cause.BAD_QUATERNION.value
+TILTED = Cause.TILTED.value
+BAD_RANGE = Cause.BAD_RANGE.value
+
+_LAST_STATUS = 4
+
+
+@kernel
+def check_frame(head: FrameHead, bodies: Rows[Body], wanted: Wanted) -> Frame:
+    """Check a frame and reduce it to a pair."""
+    strangers, number = head.strangers, head.frame_number
+    if not head.sound:
+        return _refused(MALFORMED, 0, 0, 0)
+    if not is_time(head.stamp) or ns_of(head.stamp) > wanted.latest_ns:
+        return _refused(BAD_STAMP, 0, number, strangers)
+    capture_ns = ns_of(head.stamp)
+    first, second = load(Body, bodies, wanted.leader), load(Body, bodies, wanted.follower)
+    cause = _pair_cause(first.seen, second.seen, strangers)
+    if cause == ACCEPTED:
+        cause = place_cause(first.place)
+    if cause == ACCEPTED:
+        cause = place_cause(second.place)
+    if cause != ACCEPTED:
+        return _refused(cause, capture_ns, number, strangers)
+    pose = planar(second.place)
+    return Frame(
+        ACCEPTED, capture_ns, number, strangers, first.place.x, first.place.y, pose.x, pose.y, pose.theta
+    )
+
+
+@kernel
+def _refused(cause: int, capture_ns: int, frame_number: int, strangers: int) -> Frame:
+    return Frame(cause, capture_ns, frame_number, strangers, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def _pair_cause(leaders: int, followers: int, strangers: int) -> int:
+    if leaders > 1 or followers > 1:
+        return DUPLICATE_BODY
+    if leaders == 0 and followers == 0 and strangers > 0:
+        return UNKNOWN_BODY
+    if leaders == 0:
+        return MISSING_LEADER
+    return ACCEPTED if followers > 0 else MISSING_FOLLOWER
+
+
+@kernel
+def place_cause(place: Placement) -> int:
+    """Why a body's pose is not one of a robot on the ground, ACCEPTED if it is."""
+    p = place
+    if not _all_finite(p):
+        return NOT_FINITE
+    if not _all_within(p, FARTHEST):
+        return OUT_OF_RANGE
+    norm = _norm(p)
+    if abs(norm - 1.0) > _UNIT_TOLERANCE:
+        return BAD_QUATERNION
+    x, y = p.qx / norm, p.qy / norm
+    return ACCEPTED if 1.0 - 2.0 * (x * x + y * y) >= _UPRIGHT else TILTED
+
+
+@kernel
+def _all_finite(p: Placement) -> bool:
+    return (
+        math.isfinite(p.x)
+        and math.isfinite(p.y)
+        and math.isfinite(p.z)
+        and math.isfinite(p.qx)
+        and math.isfinite(p.qy)
+        and math.isfinite(p.qz)
+        and math.isfinite(p.qw)
+    )
+
+
+@kernel
+def _all_within(p: Placement, largest: float) -> bool:
+    return (
+        abs(p.x) <= largest
+        and abs(p.y) <= largest
+        and abs(p.z) <= largest
+        and abs(p.qx) <= largest
+        and abs(p.qy) <= largest
+        and abs(p.qz) <= largest
+        and abs(p.qw) <= largest
+    )
+
+
+@kernel
+def _norm(p: Placement) -> float:
+    return math.sqrt(p.qx * p.qx + p.qy * p.qy + p.qz * p.qz + p.qw * p.qw)
+
+
+@kernel
+def planar(place: Placement) -> Pose:
+    """Ground pose of a body with z up whose place has no cause against it; its heading is its x axis' yaw."""
+    norm = _norm(place)
+    x, y, z, w = place.qx / norm, place.qy / norm, place.qz / norm, place.qw / norm
+    return Pose(place.x, place.y, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+
+
+@kernel
+def upright(pose: Pose) -> Placement:
+    """Place of a body with z up that stands on the ground."""
+    half = 0.5 * pose.theta
+    return Placement(pose.x, pose.y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
+
+
+@kernel
+def check_odometry(told: Odometry, latest_ns: int) -> CheckedMotion:
+    """Check a robot's own motion."""
+    cause = ACCEPTED if told.sound else MALFORMED
+    if cause == ACCEPTED:
+        cause = _pair_of_numbers_cause(told.v, told.u, FASTEST)
+    if cause == ACCEPTED and (not is_time(told.stamp) or ns_of(told.stamp) > latest_ns):
+        cause = BAD_STAMP
+    return CheckedMotion(cause, ns_of(told.stamp), told.v, told.u)
+
+
+@kernel
+def check_sighting(seen: RangeAndBearing, latest_ns: int) -> Sighting:
+    """Check a sighting of the leader."""
+    cause = ACCEPTED if seen.sound else MALFORMED
+    if cause == ACCEPTED:
+        cause = _pair_of_numbers_cause(seen.rho, seen.alpha2, FARTHEST)
+    if cause == ACCEPTED and seen.rho <= 0.0:
+        cause = BAD_RANGE
+    if cause == ACCEPTED and (not is_time(seen.stamp) or ns_of(seen.stamp) > latest_ns):
+        cause = BAD_STAMP
+    return Sighting(cause, ns_of(seen.stamp), seen.rho, seen.alpha2)
+
+
+@kernel
+def _pair_of_numbers_cause(a: float, b: float, largest: float) -> int:
+    if not math.isfinite(a) or not math.isfinite(b):
+        return NOT_FINITE
+    return ACCEPTED if abs(a) <= largest and abs(b) <= largest else OUT_OF_RANGE
+
+
+@kernel
+def estimate_cause(read: ReadEstimate, latest_ns: int) -> int:
+    """Why an estimate is not used: MALFORMED, also for a status that does not exist, or BAD_STAMP."""
+    n = read.numbers
+    if not read.sound or n.status > _LAST_STATUS:
+        return MALFORMED
+    return ACCEPTED if n.measured_ns <= n.capture_ns and n.capture_ns <= latest_ns else BAD_STAMP
