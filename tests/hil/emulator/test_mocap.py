@@ -26,8 +26,8 @@ from hil.emulator.mocap import (
     whole_ns,
 )
 from hil.emulator.robot import standing
-from hil.wire.intake import read_frame
 from hil.wire.messages import encode
+from hil.wire.reading import read_frame
 
 DELIVERY = Delivery(latency=0.03, jitter=0.02, loss=0.05)
 COUNT = 4000
