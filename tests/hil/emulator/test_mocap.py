@@ -28,6 +28,7 @@ from hil.emulator.mocap import (
 )
 from hil.emulator.robot import standing
 from hil.wire.messages import encode
+from hil.wire.reading import read_frame
 
 DELIVERY = Delivery(latency=0.03, jitter=0.02, loss=0.05)
 COUNT = 4000

@@ -14,12 +14,12 @@ from estimation.tracking.tracker import Status
 from formation.pose import Motion
 from hil.lockstep.lockstep import EPOCH_NS
 from hil.nodes.controller import ControllerNode, ControllerState
-from hil.nodes.node import Outgoing, digest
+from hil.nodes.node import Outgoing
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.drive_message import drive_message
-from hil.wire.events import TICK, Event
+from hil.wire.events import TICK, Event, digest
 from hil.wire.messages import decode_as, encode, header, to_ns, to_time
 
 MS = 1_000_000

@@ -19,12 +19,12 @@ from hil.lockstep.lockstep import EPOCH_NS
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import read_log
 from hil.nodes.estimator import EstimatorNode, EstimatorState
-from hil.nodes.node import Outgoing, digest
+from hil.nodes.node import Outgoing
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import EstimatorName
 from hil.wire import message_types as msg
 from hil.wire import topics
-from hil.wire.events import TICK, Event
+from hil.wire.events import TICK, Event, digest
 from hil.wire.messages import decode_as, encode, header, to_ns
 
 FRAME_NS = 8_333_333
