@@ -1,13 +1,23 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controllers.laws import LAWS, Gains, constant_bearing, ideal, ideal_speed, independent, independent_speed
+from controllers.laws import (
+    LAWS,
+    Gains,
+    constant_bearing,
+    ideal,
+    ideal_speed,
+    independent,
+    independent_speed,
+    leaning,
+)
 from controllers.limits import Limits, clip
 from formation.pose import Motion
 from formation.shape import (
@@ -20,6 +30,7 @@ from formation.shape import (
     shape_rates,
 )
 from formation.spacing import Spacing, lyapunov
+from formation.station import Side, Station
 
 angles = st.floats(-math.pi, math.pi, exclude_min=True)
 shapes = st.builds(Shape, st.floats(0.05, 5), angles, angles)
@@ -141,3 +152,75 @@ def test_gains_without_sense_are_refused(bad: float) -> None:
         Gains(bad, 2.0, GAINS.spacing)
     with pytest.raises(ValueError, match="mu2"):
         Gains(1.5, bad, GAINS.spacing)
+
+
+stations = st.builds(Station, st.sampled_from(Side), st.floats(0.3, math.pi - 0.3))
+
+
+@given(shapes, leaders, st.floats(-3, 3), stations, st.floats(-1.0, 1.0))
+@settings(deadline=None)
+def test_steering_turns_towards_the_stations_bearing_less_the_leaning(
+    shape: Shape, leader: Motion, v2: float, station: Station, lean: float
+) -> None:
+    gains = replace(GAINS, station=station)
+    for leaning_by in (lean, 0.0):
+        u2 = constant_bearing(shape, leader.v, v2, gains, leaning_by)
+        alpha2_dot = shape_rates(shape, leader, Motion(v2, u2)).alpha2_dot
+        off = shape.alpha2 - (station.alpha2 - leaning_by)
+        assert alpha2_dot == pytest.approx(-2.0 * math.sin(off), abs=1e-8)
+
+
+@given(shapes, leaders, stations)
+@settings(deadline=None)
+def test_across_the_line_the_speed_is_that_of_eq_8_at_every_station(
+    shape: Shape, leader: Motion, station: Station
+) -> None:
+    gains = replace(GAINS, station=station)
+    side = 1.0 if station.side is Side.RIGHT else -1.0
+    f = 20.0 * (1.0 - (0.2 / shape.rho) ** 2)
+    restoring = side * leader.v * f - 1.5 * math.sin(shape.alpha1 - station.alpha1)
+    across = -leader.v * math.sin(shape.alpha1) + shape.rho * restoring
+    v2 = independent_speed(shape, leader.v, gains)
+    assert v2 * math.sin(station.alpha2) == pytest.approx(across, rel=1e-9, abs=1e-9)
+    more = ideal_speed(shape, leader.v, leader.u, gains) - v2
+    assert more * math.sin(station.alpha2) == pytest.approx(shape.rho * leader.u, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("side", Side)
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize(("rho", "pull"), [(0.4, 0.75), (0.2, 0.0), (0.16, -0.5625), (0.1, -1.0)])
+def test_the_leaning_is_the_tilt_by_the_share_that_is_missing_and_by_the_pull(
+    side: Side, sign: float, rho: float, pull: float
+) -> None:
+    gains = replace(GAINS, station=Station(side), tilt=0.4)
+    towards = 1.0 if side is Side.RIGHT else -1.0
+    found = leaning(rho, sign * 0.5, sign * 0.2, gains)
+    assert found == pytest.approx(towards * 0.4 * sign * 0.6 * pull, rel=1e-12, abs=1e-15)
+    assert leaning(rho, sign * 0.5, sign * 0.5, gains) == 0.0
+    assert leaning(rho, sign * 0.5, sign * 0.2, replace(gains, tilt=0.0)) == 0.0
+
+
+def test_who_is_to_stand_does_not_lean() -> None:
+    assert leaning(0.4, 0.0, 0.0, replace(GAINS, tilt=0.4)) == 0.0
+    # At rho_0 and abeam of a leader that stands, exactly nothing is wanted.
+    standing = Shape(0.2, ABREAST_ALPHA1, 1.0)
+    plain = independent(standing, 0.0, 0.0, GAINS, Limits(0.22, 2.84))
+    assert independent(standing, 0.0, 0.0, replace(GAINS, tilt=0.4), Limits(0.22, 2.84)) == plain
+
+
+def test_a_follower_that_cannot_keep_up_turns_towards_a_far_leader() -> None:
+    shape, limits, tilted = Shape(0.8, -1.2, 1.4), Limits(0.1, 2.84), replace(GAINS, tilt=0.3)
+    wanted = independent(shape, 0.08, 0.0, tilted, limits)
+    assert wanted.v > limits.v_max
+    lean = leaning(0.8, wanted.v, limits.v_max, tilted)
+    assert lean > 0.0
+    alpha2_dot = shape_rates(shape, Motion(0.08, 0.0), Motion(limits.v_max, wanted.u)).alpha2_dot
+    assert alpha2_dot == pytest.approx(-2.0 * math.sin(1.4 - (ABREAST_ALPHA2 - lean)), abs=1e-12)
+    assert independent(shape, 0.08, 0.0, tilted).u == independent(shape, 0.08, 0.0, GAINS).u
+
+
+@pytest.mark.parametrize("tilt", [-1e-9, 0.5 * math.pi, math.nan, math.inf])
+def test_a_tilt_to_behind_is_refused(tilt: float) -> None:
+    with pytest.raises(ValueError, match="tilt"):
+        replace(GAINS, tilt=tilt)
+    assert replace(GAINS, tilt=math.nextafter(0.5 * math.pi, 0.0)).tilt > 1.5
