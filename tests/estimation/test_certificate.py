@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import replace
 from typing import Any
 
@@ -247,3 +248,11 @@ def test_a_turn_that_no_distance_balances_is_told_from_a_saddle() -> None:
     balanced = certify(replace(TURTLEBOT3, k_u=math.nextafter(reach, 0.0))).formation.why
     assert "saddle" in str(balanced)
     assert "constant turn" in str(certify(replace(TURTLEBOT3, k_u=reach)).formation.why)
+
+
+def test_a_set_that_keeps_growing_is_not_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules[certify.__module__], "_ROUNDS", 1)
+    found = certify(replace(QUIET, noise="in other words")).formation_with_errors
+    assert found.figures == {}
+    assert found.assumes == ("estimates as wrong as the sound bound of h allows",)
+    assert "keep enlarging each other" in str(found.why)
