@@ -25,6 +25,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from estimation.own_motion.inputs import MotionSample
+
 from hil.emulator import node as emulator
 from hil.lockstep.lockstep import EPOCH_NS, Lockstep
 from hil.lockstep.run import START_TIMEOUT_NS, make_nodes

@@ -1,4 +1,4 @@
-"""Runs of one scenario in the compiled loop, each equal to the last bit to a lockstep run of the same seed."""
+"""Runs of one scenario in the compiled loop, each to the last bit the lockstep run of the same seed."""
 
 from __future__ import annotations
 

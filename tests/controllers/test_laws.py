@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -212,3 +213,35 @@ def test_who_cannot_drive_as_fast_leans_by_the_share_that_the_limit_takes(rho: f
         numbers = Gains(1.5, 2.0, gains.spacing, Station(side), 1.0).settings()
         assert lean(numbers, rho, wanted, driven) == pytest.approx(side.sign * share)
     assert lean(GAINS.settings(), rho, wanted, driven) == 0.0
+
+
+placed = st.builds(Station, st.sampled_from(Side), st.floats(0.3, math.pi - 0.3))
+
+
+@given(shapes, leaders, st.floats(-3, 3), placed, st.floats(-1.0, 1.0))
+@settings(deadline=None)
+def test_steering_turns_towards_the_stations_bearing_less_the_leaning(
+    shape: Shape, leader: Motion, v2: float, station: Station, lean: float
+) -> None:
+    gains = replace(GAINS, station=station)
+    for leaning_by in (lean, 0.0):
+        u2 = constant_bearing(shape, leader.v, v2, gains, leaning_by)
+        alpha2_dot = shape_rates(shape, leader, Motion(v2, u2)).alpha2_dot
+        off = shape.alpha2 - (station.alpha2 - leaning_by)
+        assert alpha2_dot == pytest.approx(-2.0 * math.sin(off), abs=1e-8)
+
+
+@given(shapes, leaders, placed)
+@settings(deadline=None)
+def test_across_the_line_the_speed_is_that_of_eq_8_at_every_station(
+    shape: Shape, leader: Motion, station: Station
+) -> None:
+    gains = replace(GAINS, station=station)
+    side = 1.0 if station.side is Side.RIGHT else -1.0
+    f = 20.0 * (1.0 - (0.2 / shape.rho) ** 2)
+    restoring = side * leader.v * f - 1.5 * math.sin(shape.alpha1 - station.alpha1)
+    across = -leader.v * math.sin(shape.alpha1) + shape.rho * restoring
+    v2 = independent_speed(shape, leader.v, gains)
+    assert v2 * math.sin(station.alpha2) == pytest.approx(across, rel=1e-9, abs=1e-9)
+    more = ideal_speed(shape, leader.v, leader.u, gains) - v2
+    assert more * math.sin(station.alpha2) == pytest.approx(shape.rho * leader.u, rel=1e-6, abs=1e-9)

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from hil.wire.intake import read_frame
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom, kstest
