@@ -31,10 +31,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from benchmarks.estimation import LIMITS, SD_U2, SD_V2
 from estimation.filters.belief import Model
 from estimation.filters.estimators import make_estimator, settling
+from estimation.models.coordinated_turn import FollowerMotion, ProcessNoise
 from estimation.models.measurement import FrontEnd, Measurement, PoseNoise, measure_body, measure_world
-from estimation.models.motion import FollowerMotion, ProcessNoise, Vector, process_noise, propagate
-from estimation.tracking.estimate import estimate_of
-from estimation.tracking.tracker import Status, Tracker, TrackSettings
+from estimation.models.motion import Vector, process_noise, propagate
+from estimation.tracking.estimate import estimate_at
+from estimation.tracking.track import Tracker
+from estimation.tracking.tracker import Status, TrackSettings
 from formation.angles import wrap
 from formation.pose import Pose, advance
 from formation.shape import shape_of
@@ -102,8 +104,8 @@ def start(tracker: Tracker, sensor: Sensor, seed: int, *, beyond: bool = False) 
         state = state if beyond else _within_limits(state)
         measurement = _seen(generator, sensor, k * dt_ns, state, pose)
         track, _ = tracker.add(track, measurement)
-        status, point = tracker.status(track, k * dt_ns), track[-1]
-        found = estimate_of(point.belief, measurement, status, point.nis, point.used_ns)
+        status = tracker.status(track, k * dt_ns)
+        found = estimate_at(track[-1], status)
         truth = shape_of(Pose(state[0], state[1], math.atan2(state[3], state[2])), pose)
         off = abs(found.v1 - math.hypot(state[2], state[3])), abs(wrap(found.alpha1 - truth.alpha1))
         sd = np.sqrt(np.diag(found.covariance))

@@ -22,18 +22,20 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from estimation.own_motion.inputs import mean_motion
-
 from benchmarks.random_leaders import random_leader
 from estimation.consistency.cramer_rao import TruePath, cramer_rao
-from estimation.filters.belief import Belief, Model, innovation
-from estimation.filters.estimator import Estimator
+from estimation.filters.belief import Model
 from estimation.filters.estimators import ESTIMATORS, make_estimator
+from estimation.filters.filter import Filter
+from estimation.filters.gaussian import Gaussian, nis_of
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, mean_motion
 from estimation.models.measurement import FrontEnd, Measurement, PoseNoise, measure_world
-from estimation.models.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise
+from estimation.models.motion import Matrix
 from estimation.tracking.estimate import estimate_of
 from estimation.tracking.smoother import smooth
-from estimation.tracking.tracker import Status, Tracker, TrackSettings
+from estimation.tracking.track import Tracker, as_filter
+from estimation.tracking.track_point import NO_JUMP
+from estimation.tracking.tracker import Status, TrackSettings
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
 from formation.shape import shape_of
@@ -113,7 +115,7 @@ def drive(generator: np.random.Generator, noise: PoseNoise, steps: int) -> Run:
     return Run(seen, truth, least, judged)
 
 
-def filtered(of: Estimator, run: Run, score: Score) -> Iterator[Belief]:
+def filtered(of: Filter, run: Run, score: Score) -> Iterator[Gaussian]:
     """Beliefs of a filter frame by frame, its NIS and its time put on the score. No gate."""
     belief, last = of.start(run.seen[0]), run.seen[0]
     yield belief
@@ -125,12 +127,12 @@ def filtered(of: Estimator, run: Run, score: Score) -> Iterator[Belief]:
         score.seconds += time.perf_counter() - begun
         score.steps += 1
         if k * DT >= JUDGED_FROM:
-            score.nis.append(innovation(prior, measurement).nis)
+            score.nis.append(nis_of(prior, measurement.x, measurement.y, measurement.spread))
         last = measurement
         yield belief
 
 
-def smoothed(run: Run, score: Score) -> Iterator[Belief]:
+def smoothed(run: Run, score: Score) -> Iterator[Gaussian]:
     """Beliefs of the smoother; the NIS is that of its forward pass."""
     begun = time.perf_counter()
     points = smooth(
@@ -146,9 +148,9 @@ def judge(kind: str, run: Run, score: Score) -> None:
     if kind == SMOOTHER:
         beliefs = list(smoothed(run, score))
     else:
-        beliefs = list(filtered(make_estimator(kind, MODEL), run, score))
+        beliefs = list(filtered(as_filter(make_estimator(kind, MODEL)), run, score))
     for k in run.judged:
-        found = estimate_of(beliefs[k], run.seen[k], Status.TRACKING, math.nan, 0)
+        found = estimate_of(beliefs[k], run.seen[k], Status.TRACKING, math.nan, 0, NO_JUMP)
         (v1, alpha1), (_, _, sd_v1, sd_alpha1, _) = run.truth[k], np.sqrt(np.diag(found.covariance)).tolist()
         errors = found.v1 - v1, wrap(found.alpha1 - alpha1)
         score.errors.append(errors)

@@ -27,14 +27,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from estimation.own_motion.inputs import History, MotionSample, follower_motion, remember
-from estimation.tracking.screening import NO_DOUBT
-
 from controllers.laws import independent
 from controllers.limits import Limits
 from estimation.models.measurement import FrontEnd, measure_body_from_mocap, measure_world
+from estimation.own_motion.odometry_history import History, MotionSample, follower_motion, remember
 from estimation.tracking.estimate import Estimate, estimate_at
-from estimation.tracking.tracker import Status, Track, Verdict
+from estimation.tracking.follower_check import NO_DOUBT
+from estimation.tracking.track import Track
+from estimation.tracking.track_point import Verdict
+from estimation.tracking.tracker import Status
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
 from formation.shape import Shape, follower_pose, shape_of, shape_rates

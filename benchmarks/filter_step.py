@@ -25,8 +25,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from estimation.filters import kernels
 from estimation.filters.belief import Belief, Model
 from estimation.filters.estimators import make_estimator
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, Measurement
-from estimation.models.motion import FollowerMotion, LeaderLimits, ProcessNoise
 
 DT = 1.0 / 120.0
 LIMITS = LeaderLimits(v_eps=0.04, k_v=0.22, k_u=0.7)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimation.models.motion import Matrix, ProcessNoise, Vector, process_noise, propagate
+from estimation.models.coordinated_turn import ProcessNoise
+from estimation.models.motion import Matrix, Vector, process_noise, propagate
 
 
 def random_leader(

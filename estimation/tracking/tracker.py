@@ -317,10 +317,12 @@ def _inserted(
     k = place_of(points, ring, capture_ns)
     if capture_at(points, ring, k) == capture_ns:
         return Added(ring, DUPLICATE, BELIEVED)
-    if n == size(points):
-        ring, n, k = Ring(place(ring, points, 1), n - 1), n - 1, k - 1
-    if k <= 0 or capture_ns < capture_at(points, ring, n - 1) - window_ns(settings):
+    full = n == size(points)
+    least = 2 if full else 1
+    if k < least or capture_ns < capture_at(points, ring, n - 1) - window_ns(settings):
         return Added(ring, LATE, BELIEVED)
+    if full:
+        ring, n, k = Ring(place(ring, points, 1), n - 1), n - 1, k - 1
     for at in range(n, k, -1):
         store(points, place(ring, points, at), point_at(points, ring, at - 1))
     here = point_at(points, ring, k)

@@ -134,9 +134,11 @@ def by_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> 
 
 @kernel
 def due_pose(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> OwnPoint:
-    """The follower's pose, ready to be folded into its own track, with the odometry of its moment."""
+    """The follower's pose, ready to be folded into its own track, with the odometry of its moment if fused."""
     told = rules.source == FUSED and known.odometry.length > 0
-    odometry = by_odometry(known, memory, rules, capture_ns)
+    odometry = FollowerMotion(0.0, 0.0, 0.0, 0.0)
+    if told:
+        odometry = by_odometry(known, memory, rules, capture_ns)
     return own_begun(capture_ns, seen.follower, told, odometry, rules.own_noise)
 
 

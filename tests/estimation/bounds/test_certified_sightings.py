@@ -6,7 +6,6 @@ from collections.abc import Iterable
 
 import numpy as np
 import pytest
-from estimation.own_motion.inputs import History, MotionSample
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from estimation.bounds.certified import Certain, Failed
 from estimation.bounds.certified_sightings import SightingCertifier, SightingErrors, velocity_error
 from estimation.bounds.recent import NOTHING_RECENT, Recent
+from estimation.own_motion.odometry_history import History, MotionSample
 from formation.angles import FloatArray, wrap
 
 ERRORS = SightingErrors(E_rho=2e-3, E_alpha2=0.01, M_v2=3e-3, M_u2=0.02)

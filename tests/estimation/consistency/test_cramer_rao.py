@@ -10,8 +10,8 @@ from scipy.linalg import solve_discrete_are
 
 from estimation.consistency.cramer_rao import TruePath, cramer_rao, state_bound
 from estimation.filters.belief import Model
+from estimation.models.coordinated_turn import LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, PoseNoise
-from estimation.models.motion import LeaderLimits, ProcessNoise
 from estimation.tracking.estimate import QUANTITIES
 from formation.angles import FloatArray, wrap
 from formation.pose import Motion, Pose

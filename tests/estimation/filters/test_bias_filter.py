@@ -7,15 +7,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from estimation.filters.compiled import CompiledExtended
-from estimation.own_motion.inputs import mean_motion
 
 from estimation.filters.belief import Belief, Model
 from estimation.filters.bias_filter import BiasedExtended, offsets_of
-from estimation.filters.estimator import Estimator
+from estimation.filters.estimator import Estimator, RecordFilter
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, mean_motion
 from estimation.models.measurement import FrontEnd, Measurement, measure_body
-from estimation.models.motion import FollowerMotion, LeaderLimits, ProcessNoise, Vector
+from estimation.models.motion import Vector
 from estimation.tracking.estimate import estimate_of
+from estimation.tracking.track_point import NO_JUMP
 from estimation.tracking.tracker import Status
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
@@ -74,7 +74,7 @@ def tracked(estimator: Estimator, seen: list[Measurement]) -> list[Belief]:
 
 
 def alpha1_error(belief: Belief, seen: Measurement, alpha1: float) -> tuple[float, float]:
-    found = estimate_of(belief, seen, Status.TRACKING, math.nan, 0)
+    found = estimate_of(belief.gaussian, seen, Status.TRACKING, math.nan, 0, NO_JUMP)
     return float(wrap(found.alpha1 - alpha1)), math.sqrt(found.covariance[3, 3])
 
 
@@ -91,7 +91,7 @@ def test_offsets_are_found_while_the_pair_moves_against_each_other() -> None:
         sd = np.sqrt(np.diag(offsets.covariance))
         assert np.all(sd < 0.5 * np.array(PRIOR))
         assert np.all(np.abs(offsets.mean - OFFSETS) < 3.5 * sd)
-        without = tracked(CompiledExtended(MODEL), seen)
+        without = tracked(RecordFilter(MODEL), seen)
         for errors, beliefs in ((plain, without), (biased, with_offsets)):
             late = zip(beliefs[-100:], seen[-100:], alpha1[-100:], strict=True)
             errors += [alpha1_error(*each)[0] for each in late]
@@ -118,7 +118,7 @@ def test_what_a_kept_formation_cannot_tell_stays_unknown_and_is_told_so() -> Non
 def test_without_offsets_it_is_the_plain_filter() -> None:
     seen, _ = sightings(weaving, np.zeros(2), 5.0, 1)
     sure = tracked(BiasedExtended(MODEL, 1e-9, 1e-9), seen)[-1]
-    plain = tracked(CompiledExtended(MODEL), seen)[-1]
+    plain = tracked(RecordFilter(MODEL), seen)[-1]
     # It takes the measurement as it is shown, range and bearing bent into a plane: the same to first order.
     assert sure.mean == pytest.approx(plain.mean, rel=1e-6, abs=1e-8)
     assert sure.covariance == pytest.approx(plain.covariance, rel=1e-6, abs=1e-10)
@@ -126,10 +126,10 @@ def test_without_offsets_it_is_the_plain_filter() -> None:
 
 def test_the_gate_knows_of_the_offsets() -> None:
     seen, _ = sightings(weaving, np.array([0.1, 0.0]), 0.1, 2)
-    far = replace(seen[1], position=seen[1].position + np.array([0.0, 0.1]))
+    far = seen[1]._replace(y=seen[1].y + 0.1)
     surprise = []
     for sd in (1e-6, 0.1):
-        estimator = BiasedExtended(replace(MODEL, limits=replace(LIMITS, k_v=0.05)), sd, sd)
+        estimator = BiasedExtended(replace(MODEL, limits=LIMITS._replace(k_v=0.05)), sd, sd)
         # Sure of the leader, so that only the offsets can explain what is seen.
         begun = estimator.start(seen[0])
         belief = begun._replace(

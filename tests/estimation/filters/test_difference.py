@@ -8,11 +8,13 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from estimation.filters.belief import Belief, Model
-from estimation.filters.difference import DifferenceEstimator
+from estimation.filters.belief import Model
+from estimation.filters.filter import Filter, Kind, filter_of
+from estimation.filters.gaussian import Gaussian
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, Measurement, PoseNoise, measure_body, measure_world
-from estimation.models.motion import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.tracking.estimate import Estimate, estimate_of
+from estimation.tracking.track_point import NO_JUMP
 from estimation.tracking.tracker import Status
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
@@ -24,11 +26,12 @@ CUTOFF = 0.1
 LIMITS = LeaderLimits(v_eps=0.04, k_v=0.3, k_u=0.7)
 
 
-def estimator(front_end: FrontEnd) -> DifferenceEstimator:
-    return DifferenceEstimator(Model(front_end, LIMITS, ProcessNoise.by_rule(LIMITS, 0.5)), CUTOFF)
+def estimator(front_end: FrontEnd) -> Filter:
+    model = Model(front_end, LIMITS, ProcessNoise.by_rule(LIMITS, 0.5))
+    return filter_of(Kind.DIFFERENCE, model, CUTOFF)
 
 
-def followed(of: DifferenceEstimator, measurements: list[Measurement]) -> list[Belief]:
+def followed(of: Filter, measurements: list[Measurement]) -> list[Gaussian]:
     beliefs = [of.start(measurements[0])]
     for before, measurement in pairwise(measurements):
         dt = (measurement.capture_ns - before.capture_ns) * 1e-9
@@ -37,8 +40,8 @@ def followed(of: DifferenceEstimator, measurements: list[Measurement]) -> list[B
     return beliefs
 
 
-def estimated(belief: Belief, measurement: Measurement) -> Estimate:
-    return estimate_of(belief, measurement, Status.TRACKING, math.nan, measurement.capture_ns)
+def estimated(belief: Gaussian, measurement: Measurement) -> Estimate:
+    return estimate_of(belief, measurement, Status.TRACKING, math.nan, measurement.capture_ns, NO_JUMP)
 
 
 @given(
@@ -97,7 +100,6 @@ def test_rates_follow_a_step_with_the_time_constant_of_the_low_pass() -> None:
     for after in (0.05, 0.1, 0.3):
         k = 60 + round(after / DT)
         rates = beliefs[k].rates
-        assert rates is not None
         # A backward difference through a discrete low-pass: within one frame of the continuous answer.
         assert rates.rho_dot == pytest.approx(0.1 * (1.0 - math.exp(-after / CUTOFF)), abs=0.1 * DT / CUTOFF)
 

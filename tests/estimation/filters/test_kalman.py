@@ -10,16 +10,14 @@ from hypothesis import strategies as st
 
 from benchmarks.random_leaders import random_leader
 from estimation.consistency.cramer_rao import TruePath, state_bound
-from estimation.filters.belief import Belief, Model, innovation
+from estimation.filters.belief import Model
 from estimation.filters.estimators import make_estimator
+from estimation.filters.filter import Filter
+from estimation.filters.gaussian import Gaussian, nis_of
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, Measurement
-from estimation.models.motion import (
-    FollowerMotion,
-    LeaderLimits,
-    Matrix,
-    ProcessNoise,
-    Vector,
-)
+from estimation.models.motion import Matrix, Vector
+from estimation.tracking.track import as_filter
 from formation.angles import wrap
 
 DT = 1.0 / 120.0
@@ -31,8 +29,12 @@ SIGMA = 1e-3
 FILTERS = ("ekf", "ukf", "ekf-filterpy", "ukf-filterpy")
 
 
+def estimator_of(kind: str, model: Model = MODEL) -> Filter:
+    return as_filter(make_estimator(kind, model))
+
+
 def seen(position: Vector, step: int = 0, sigma: float = SIGMA) -> Measurement:
-    return Measurement(round(step * DT * 1e9), position, sigma**2 * np.eye(2), STANDING)
+    return Measurement.at(round(step * DT * 1e9), position, sigma**2 * np.eye(2), STANDING)
 
 
 def drawn_leader(generator: np.random.Generator, steps: int) -> Matrix:
@@ -49,7 +51,7 @@ def test_without_turning_it_is_the_textbook_kalman_filter(kind: str) -> None:
     # A turn rate known to be zero makes the motion linear, a huge v_eps makes the noise isotropic. It is not
     # quite zero, as sigma points need a covariance of full rank.
     limits = LeaderLimits(v_eps=1e4, k_v=0.3, k_u=1e-6)
-    estimator = make_estimator(kind, Model(FrontEnd.WORLD, limits, ProcessNoise(9e-4, 1e-14, 1e4)))
+    estimator = estimator_of(kind, Model(FrontEnd.WORLD, limits, ProcessNoise(9e-4, 1e-14, 1e4)))
     generator = np.random.default_rng(1)
     truth = np.stack([0.2 * DT * np.arange(200), -0.1 * DT * np.arange(200)], axis=1)
     positions = truth + SIGMA * generator.standard_normal(truth.shape)
@@ -75,9 +77,9 @@ def test_extended_and_unscented_agree_where_the_motion_is_nearly_linear(
     pair: tuple[str, str], model: Model
 ) -> None:
     follower = FollowerMotion(0.15, 0.4, 1e-4, 1e-4)
-    belief = Belief(np.array([0.3, 0.1, 0.2, 0.05, 0.5]), np.diag([1e-8, 1e-8, 1e-7, 1e-7, 1e-6]))
-    after: list[Belief] = []
-    for estimator in (make_estimator(kind, model) for kind in pair):
+    belief = Gaussian.of(np.array([0.3, 0.1, 0.2, 0.05, 0.5]), np.diag([1e-8, 1e-8, 1e-7, 1e-7, 1e-6]))
+    after: list[Gaussian] = []
+    for estimator in (estimator_of(kind, model) for kind in pair):
         prior = estimator.predict(belief, DT, follower)
         after.append(estimator.update(prior, seen(prior.mean[0:2] + 1e-4, sigma=1e-4)))
     assert after[0].mean == pytest.approx(after[1].mean, abs=1e-8)
@@ -89,7 +91,7 @@ class Step:
 
     def __init__(self, dt: float, x: float, y: float, sigmas: tuple[float, float], v2: float, u2: float):
         self.dt = dt
-        self.measurement = Measurement(0, np.array([x, y]), np.diag(np.square(sigmas)), STANDING)
+        self.measurement = Measurement.at(0, np.array([x, y]), np.diag(np.square(sigmas)), STANDING)
         self.follower = FollowerMotion(v2, u2, 0.01, 0.05)
 
     def __repr__(self) -> str:
@@ -116,7 +118,7 @@ any_steps = st.builds(
 def test_covariance_stays_symmetric_and_positive_definite_whatever_comes(
     kind: str, model: Model, steps: list[Step]
 ) -> None:
-    estimator = make_estimator(kind, model)
+    estimator = estimator_of(kind, model)
     belief = estimator.start(steps[0].measurement)
     for step in steps:
         belief = estimator.update(estimator.predict(belief, step.dt, step.follower), step.measurement)
@@ -128,7 +130,7 @@ def test_covariance_stays_symmetric_and_positive_definite_whatever_comes(
 
 @pytest.mark.parametrize("kind", FILTERS)
 def test_prediction_and_update_leave_their_arguments_alone(kind: str) -> None:
-    estimator = make_estimator(kind, MODEL)
+    estimator = estimator_of(kind)
     before = estimator.start(seen(np.array([0.1, 0.2])))
     mean, covariance = before.mean.copy(), before.covariance.copy()
     prior = estimator.predict(before, DT, STANDING)
@@ -144,11 +146,11 @@ def test_prediction_and_update_leave_their_arguments_alone(kind: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["ekf", "ukf"])  # filterpy's give the same: test_compiled
+@pytest.mark.parametrize("kind", ["ekf", "ukf"])  # filterpy's give the same: test_filter
 def test_on_random_leaders_it_is_consistent_and_close_to_the_bound(kind: str) -> None:
     runs, steps, late = 16, 420, 180
     generator = np.random.default_rng(21)
-    estimator = make_estimator(kind, MODEL)
+    estimator = estimator_of(kind)
     nis, errors, deviations, bounds = [], [], [], []
     for _ in range(runs):
         truth = drawn_leader(generator, steps)
@@ -159,7 +161,7 @@ def test_on_random_leaders_it_is_consistent_and_close_to_the_bound(kind: str) ->
             prior = estimator.predict(belief, DT, STANDING)
             belief = estimator.update(prior, measurement)
             if step >= late:
-                nis.append(innovation(prior, measurement).nis)
+                nis.append(nis_of(prior, measurement.x, measurement.y, measurement.spread))
                 errors.append(polar(belief.mean) - polar(truth[step]))
                 deviations.append(polar_deviations(belief.mean, belief.covariance))
         path = TruePath(

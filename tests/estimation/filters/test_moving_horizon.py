@@ -11,8 +11,9 @@ from estimation.filters.estimator import Estimator
 from estimation.filters.kalman import ExtendedFilter
 from estimation.filters.memory import Horizon
 from estimation.filters.moving_horizon import MovingHorizon
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, Measurement
-from estimation.models.motion import FollowerMotion, LeaderLimits, Matrix, ProcessNoise
+from estimation.models.motion import Matrix
 
 DT = 1.0 / 120.0
 SIGMA = 1e-3
@@ -31,7 +32,7 @@ def drawn_leader(generator: np.random.Generator, steps: int) -> Matrix:
 def measured(generator: np.random.Generator, truth: Matrix) -> list[Measurement]:
     seen = truth[:, 0:2] + SIGMA * generator.standard_normal((len(truth), 2))
     return [
-        Measurement(round(k * DT * 1e9), position, SIGMA**2 * np.eye(2), STANDING)
+        Measurement.at(round(k * DT * 1e9), position, SIGMA**2 * np.eye(2), STANDING)
         for k, position in enumerate(seen)
     ]
 

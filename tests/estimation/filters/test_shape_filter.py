@@ -10,6 +10,7 @@ from estimation.filters.estimator import Estimator
 from estimation.filters.kalman import ExtendedFilter
 from estimation.filters.memory import Guess, ShapeState
 from estimation.filters.shape_filter import ShapeFilter
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import (
     FrontEnd,
     Measurement,
@@ -17,8 +18,8 @@ from estimation.models.measurement import (
     measure_body_from_mocap,
     measure_world,
 )
-from estimation.models.motion import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.tracking.estimate import Estimate, estimate_of
+from estimation.tracking.track_point import NO_JUMP
 from estimation.tracking.tracker import Status
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
@@ -66,7 +67,7 @@ def followed(of: Estimator, seen: list[Measurement]) -> tuple[list[Belief], list
 
 def estimates(beliefs: list[Belief], seen: list[Measurement]) -> list[Estimate]:
     return [
-        estimate_of(belief, measurement, Status.TRACKING, math.nan, 0)
+        estimate_of(belief.gaussian, measurement, Status.TRACKING, math.nan, 0, NO_JUMP)
         for belief, measurement in zip(beliefs, seen, strict=True)
     ]
 
@@ -112,15 +113,7 @@ def test_a_guess_does_not_average_over_the_time_before_the_leader_set_off() -> N
     x, y = waiting[-1].position.tolist()
     belief = followed(of, waiting)[0][-1]
     for k in range(1, 90):
-        position = np.array([x + 0.2 * k * DT, y])
-        moved = Measurement(
-            waiting[-1].capture_ns + k * DT_NS,
-            position,
-            waiting[-1].covariance,
-            waiting[-1].motion,
-            waiting[-1].pose,
-            NOISE,
-        )
+        moved = waiting[-1]._replace(capture_ns=waiting[-1].capture_ns + k * DT_NS, x=x + 0.2 * k * DT, y=y)
         belief = of.update(of.predict(belief, DT, FollowerMotion(0.0, 0.0, SD_V2, SD_U2)), moved)
     assert belief.mean[2:4] == pytest.approx([0.2, 0.0], abs=0.03)
 

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from estimation.filters.belief import Model
 from estimation.filters.shape_motion import cartesian, drive_through, jacobians, range_and_bearing, rates
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, PoseNoise, measure_body_from_mocap, measure_world
-from estimation.models.motion import FollowerMotion, LeaderLimits, ProcessNoise, propagate_body
+from estimation.models.motion import propagate_body
 from formation.pose import Pose
 
 LIMITS = LeaderLimits(v_eps=0.04, k_v=0.3, k_u=0.7)

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import (
     PoseNoise,
     from_sensor,
@@ -15,7 +16,6 @@ from estimation.models.measurement import (
     measure_body_from_mocap,
     measure_world,
 )
-from estimation.models.motion import FollowerMotion
 from formation.pose import Pose
 from formation.shape import Shape, follower_pose
 

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,11 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.motion import (
-    FollowerMotion,
-    LeaderLimits,
     Matrix,
-    ProcessNoise,
     Vector,
     process_noise,
     process_noise_body,
@@ -22,7 +19,6 @@ from estimation.models.motion import (
     propagate_body,
     transition,
     transition_body,
-    turn_integrals,
 )
 from formation.pose import Pose, advance
 
@@ -44,19 +40,6 @@ def slopes(function: Callable[[Vector], Vector], at: Vector, step: float = 1e-5)
         near, far = (function(at + k * offset) - function(at - k * offset) for k in (1.0, 2.0))
         columns.append((8.0 * near - far) / (12.0 * step))
     return np.column_stack(columns)
-
-
-@given(turns, steps)
-@settings(deadline=None)
-def test_turn_integrals_are_those_of_cosine_and_sine(u: float, dt: float) -> None:
-    nodes, weights = np.polynomial.legendre.leggauss(30)
-    t = 0.5 * dt * (nodes + 1.0)
-    integrands = (np.cos(u * t), np.sin(u * t), -t * np.sin(u * t), t * np.cos(u * t))
-    expected = [float(0.5 * dt * weights @ integrand) for integrand in integrands]
-    found = turn_integrals(u, dt)
-    assert found[:2] == pytest.approx(expected[:2], abs=1e-14)
-    # Next to the switch the closed form of the derivatives loses three digits, no more.
-    assert found[2:] == pytest.approx(expected[2:], abs=1e-12)
 
 
 @given(states, steps)
@@ -180,7 +163,7 @@ def test_noise_drives_the_speed_and_leaves_the_direction_to_the_turn_rate() -> N
 
 
 def test_only_a_leader_that_stands_is_expected_to_set_off() -> None:
-    without = replace(NOISE, q_start=0.0)
+    without = NOISE._replace(q_start=0.0)
     for speed, more in ((0.0, True), (0.039, True), (0.04, False), (0.3, False)):
         state = np.array([0.0, 0.0, 0.0, speed, 0.1])
         added = process_noise(state, 0.01, NOISE) - process_noise(state, 0.01, without)

@@ -8,14 +8,28 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import PoseNoise
-from estimation.models.motion import FollowerMotion
-from estimation.own_motion.own_track import OwnNoise, OwnTrack, fold, own_motion
+from estimation.models.motion import Matrix, Vector
+from estimation.own_motion.own_track import (
+    OwnNoise,
+    OwnPoint,
+    folded,
+    foreseen,
+    motion_of,
+    own_begun,
+    own_followed,
+    own_place,
+    own_point,
+)
 from formation.angles import wrap
 from formation.pose import Pose, advance
+from formation.records import columns_of, rows_of
+from formation.ring import EMPTY
 
 FRAME_NS = 16_000_000
 NOISE = OwnNoise(PoseNoise(7e-4, 8e-3), v_max=0.2, u_max=0.6)
+UNTOLD = FollowerMotion(0.0, 0.0, 0.0, 0.0)
 
 
 def driven(count: int, v: float, u: float, seed: int = 1) -> list[Pose]:
@@ -28,18 +42,43 @@ def driven(count: int, v: float, u: float, seed: int = 1) -> list[Pose]:
     ]
 
 
-def folded(poses: list[Pose], odometry: FollowerMotion | None = None, span: float = 1.0) -> OwnTrack:
-    track: OwnTrack = ()
+class OwnTrack:
+    """A track in rows of its own."""
+
+    def __init__(self, span: float = 1.0, room: int = 256) -> None:
+        self.rows, self.ring, self.span = rows_of(OwnPoint, room), EMPTY, span
+
+    def fold(self, capture_ns: int, pose: Pose, odometry: FollowerMotion | None = None) -> None:
+        due = own_begun(capture_ns, pose, odometry is not None, odometry or UNTOLD, NOISE)
+        self.ring = folded(self.rows, self.ring, due, NOISE, self.span)
+
+    def points(self) -> list[OwnPoint]:
+        return [own_point(self.rows, self.ring, k) for k in range(self.ring.length)]
+
+    def motion(self) -> FollowerMotion:
+        return motion_of(self.points()[-1])
+
+
+def track_of(
+    poses: list[Pose], odometry: FollowerMotion | None = None, span: float = 1.0, room: int = 256
+) -> OwnTrack:
+    track = OwnTrack(span, room)
     for k, pose in enumerate(poses):
-        track = fold(track, k * FRAME_NS, pose, odometry, NOISE, span)
+        track.fold(k * FRAME_NS, pose, odometry)
     return track
+
+
+def motion_block(point: OwnPoint) -> Matrix:
+    """Covariance (2, 2) of v and u."""
+    spread = point.spread
+    return np.array([[spread.v_v, spread.v_u], [spread.v_u, spread.u_u]])
 
 
 @pytest.mark.slow
 def test_errors_are_as_large_as_the_filter_says() -> None:
     errors, sds = [], []
     for seed in range(60):
-        motion = folded(driven(120, 0.08, 0.4, seed), span=0.0)[-1].motion
+        motion = track_of(driven(120, 0.08, 0.4, seed), span=0.0).motion()
         errors.append((motion.v2 - 0.08, motion.u2 - 0.4))
         sds.append((motion.sd_v2, motion.sd_u2))
     # On a steady circle they are smaller: the sd also allows for a change of speed.
@@ -60,19 +99,19 @@ def test_a_filter_that_moves_as_assumed_has_the_variance_it_says() -> None:
             pose = advance(pose, v, u, step)
             shake = generator.normal(size=3) * [7e-4, 7e-4, 8e-3]
             poses.append(Pose(pose.x + shake[0], pose.y + shake[1], pose.theta + shake[2]))
-        point = folded(poses, span=0.0)[-1]
-        error = point.mean[3:] - [v, u]
-        ends.append(error @ np.linalg.solve(point.covariance[3:, 3:], error))
+        point = track_of(poses, span=0.0).points()[-1]
+        error = np.array([point.state.v - v, point.state.u - u])
+        ends.append(error @ np.linalg.solve(motion_block(point), error))
     assert 1.5 < np.mean(ends) < 2.5
 
 
 def test_odometry_helps_where_it_is_good_and_is_left_out_where_it_is_absurd() -> None:
     poses = driven(120, 0.08, 0.4)
-    alone = folded(poses)[-1].motion
-    helped = folded(poses, FollowerMotion(0.08, 0.4, 0.002, 0.01))[-1].motion
+    alone = track_of(poses).motion()
+    helped = track_of(poses, FollowerMotion(0.08, 0.4, 0.002, 0.01)).motion()
     assert helped.sd_u2 < 0.5 * alone.sd_u2
     assert helped.u2 == pytest.approx(0.4, abs=3.0 * helped.sd_u2)
-    absurd = folded(poses, FollowerMotion(5.0, -9.0, 0.002, 0.01))[-1].motion
+    absurd = track_of(poses, FollowerMotion(5.0, -9.0, 0.002, 0.01)).motion()
     assert (absurd.v2, absurd.u2) == pytest.approx((alone.v2, alone.u2), abs=0.02)
 
 
@@ -81,41 +120,135 @@ def test_in_whatever_order_poses_come_the_track_is_that_of_their_capture_times(
     order: list[int], twice: set[int]
 ) -> None:
     poses = driven(20, 0.1, -0.5)
-    expected = folded(poses)
-    track = folded(poses[:8])
+    expected = track_of(poses)
+    track = track_of(poses[:8])
     for k in [*(8 + k for k in order), *(8 + k for k in twice)]:
-        track = fold(track, k * FRAME_NS, poses[k], None, NOISE, 1.0)
-    assert [point.capture_ns for point in track] == [point.capture_ns for point in expected]
-    for one, other in zip(track, expected, strict=True):
-        np.testing.assert_allclose(one.mean, other.mean, atol=1e-12)
-        np.testing.assert_allclose(one.covariance, other.covariance, atol=1e-12)
+        track.fold(k * FRAME_NS, poses[k])
+    assert track.points() == expected.points()
 
 
 def test_a_flipped_heading_is_left_out_and_a_robot_that_was_moved_is_found_again() -> None:
     poses = driven(60, 0.08, 0.2)
-    before = folded(poses)
+    track = track_of(poses)
+    before = track.motion()
     flipped = Pose(poses[-1].x, poses[-1].y, wrap(poses[-1].theta + math.pi))
-    after = fold(before, 60 * FRAME_NS, flipped, None, NOISE, 1.0)
-    assert after[-1].motion.u2 == before[-1].motion.u2
+    track.fold(60 * FRAME_NS, flipped)
+    assert track.motion().u2 == before.u2
     for k in range(61, 130):
-        elsewhere = advance(Pose(9.0, 9.0, 0.0), 0.1, 0.0, k * FRAME_NS * 1e-9)
-        after = fold(after, k * FRAME_NS, elsewhere, None, NOISE, 1.0)
-    assert (after[-1].motion.v2, after[-1].motion.u2) == pytest.approx((0.1, 0.0), abs=0.01)
+        track.fold(k * FRAME_NS, advance(Pose(9.0, 9.0, 0.0), 0.1, 0.0, k * FRAME_NS * 1e-9))
+    assert track.motion()[:2] == pytest.approx((0.1, 0.0), abs=0.01)
 
 
 def test_after_a_long_silence_nothing_is_taken_for_known() -> None:
-    track = fold(
-        folded(driven(60, 0.08, 0.2)), 60 * FRAME_NS + 2_000_000_000, Pose(0, 0, 0), None, NOISE, 1.0
-    )
-    assert track[-1].motion == FollowerMotion(0.0, 0.0, NOISE.v_max, NOISE.u_max)
+    track = track_of(driven(60, 0.08, 0.2))
+    track.fold(60 * FRAME_NS + 2_000_000_000, Pose(0.0, 0.0, 0.0))
+    assert track.motion() == FollowerMotion(0.0, 0.0, NOISE.v_max, NOISE.u_max)
 
 
-def test_the_track_keeps_its_span_and_knows_the_moments_of_its_poses_only() -> None:
-    track = folded(driven(60, 0.08, 0.2), span=0.16)
-    assert len(track) == 12
-    assert all(before.capture_ns < after.capture_ns for before, after in pairwise(track))
-    assert own_motion(track, 59 * FRAME_NS) == track[-1].motion
-    assert own_motion(track, 59 * FRAME_NS - 1) is None
-    assert own_motion(track, 60 * FRAME_NS) is None
-    assert own_motion((), 0) is None
-    assert fold(track, 5 * FRAME_NS, Pose(0, 0, 0), None, NOISE, 0.16) is track
+def test_the_track_keeps_its_span_and_knows_the_moments_of_its_poses() -> None:
+    track = track_of(driven(60, 0.08, 0.2), span=0.16)
+    times = [point.capture_ns for point in track.points()]
+    assert len(times) == 12
+    assert all(before < after for before, after in pairwise(times))
+    assert [own_place(track.rows, track.ring, at_ns) for at_ns in times] == list(range(12))
+    assert own_place(track.rows, track.ring, times[-1] - 1) == 11
+    assert own_place(track.rows, track.ring, times[-1] + 1) == 12
+    before, ring = columns_of(track.rows).tobytes(), track.ring
+    for known in (5 * FRAME_NS, times[0], times[7], times[-1]):
+        track.fold(known, Pose(0.0, 0.0, 0.0))
+    assert (columns_of(track.rows).tobytes(), track.ring) == (before, ring)
+
+
+@pytest.mark.parametrize("k", [0, 1, 5, 59, 60])
+def test_what_a_pose_would_become_is_foreseen_without_putting_it_there(k: int) -> None:
+    poses = driven(61, 0.08, 0.2)
+    track = OwnTrack()
+    for number, pose in enumerate(poses[:60]):
+        if number != k:
+            track.fold(number * FRAME_NS, pose)
+    due = own_begun(k * FRAME_NS, poses[k], False, UNTOLD, NOISE)
+    before, ring = columns_of(track.rows).tobytes(), track.ring
+    found = foreseen(track.rows, ring, due, NOISE)
+    assert (columns_of(track.rows).tobytes(), track.ring) == (before, ring)
+    if k == 0:
+        assert found == due
+        return
+    track.fold(k * FRAME_NS, poses[k])
+    at = own_place(track.rows, track.ring, k * FRAME_NS)
+    assert found == own_point(track.rows, track.ring, at)
+    # A moment that the track has is told as the track has it, whatever comes with it now.
+    again = own_begun(k * FRAME_NS, Pose(7.0, 7.0, 0.0), False, UNTOLD, NOISE)
+    assert foreseen(track.rows, track.ring, again, NOISE) == found
+
+
+def test_more_poses_than_there_is_room_for_shorten_the_track_and_nothing_else() -> None:
+    poses = driven(100, 0.08, 0.4)
+    roomy, tight = track_of(poses), track_of(poses, room=8)
+    assert tight.points() == roomy.points()[-8:]
+    late = driven(101, 0.08, 0.4)[97]
+    for track in (roomy, tight):
+        track.fold(97 * FRAME_NS + 5, late)
+    assert tight.points() == roomy.points()[-8:]
+    ring = tight.ring
+    tight.fold(3 * FRAME_NS + 5, late)
+    assert tight.ring == ring
+
+
+def test_it_is_a_kalman_filter_on_the_unicycle() -> None:
+    """Against matrices: the motion by finite differences, the update in Joseph's form."""
+    generator = np.random.default_rng(9)
+    told = FollowerMotion(0.08, 0.4, 0.01, 0.05)
+    point = own_begun(0, Pose(1.0, 2.0, 3.0), False, UNTOLD, NOISE)
+    mean, covariance = np.array(point.state), covariance_of(point)
+    for k in range(1, 60):
+        pose = advance(Pose(1.0, 2.0, 3.0), 0.08, 0.4, k * 0.016)
+        shake = (generator.standard_normal(3) * [7e-4, 7e-4, 8e-3]).tolist()
+        seen = Pose(pose.x + shake[0], pose.y + shake[1], float(wrap(pose.theta + shake[2])))
+        point = own_followed(point, own_begun(k * FRAME_NS, seen, True, told, NOISE), NOISE)
+        mean, covariance = by_matrices(mean, covariance, seen, told, 0.016)
+        assert point.state[:2] == pytest.approx(mean[:2], abs=1e-9)
+        assert abs(wrap(point.state.theta - float(mean[2]))) < 1e-9
+        assert point.state[3:] == pytest.approx(mean[3:], abs=1e-8)
+        scale = np.sqrt(np.diag(covariance))
+        assert covariance_of(point) / np.outer(scale, scale) == pytest.approx(
+            covariance / np.outer(scale, scale), abs=1e-7
+        )
+
+
+def covariance_of(point: OwnPoint) -> Matrix:
+    matrix = np.empty((5, 5))
+    rows, columns = np.triu_indices(5)
+    matrix[rows, columns] = matrix[columns, rows] = point.spread
+    return matrix
+
+
+def by_matrices(
+    mean: Vector, covariance: Matrix, seen: Pose, told: FollowerMotion, dt: float
+) -> tuple[Vector, Matrix]:
+    def moved(x: Vector) -> Vector:
+        pose = advance(Pose(x[0], x[1], 0.0), x[3], x[4], dt)
+        line = complex(pose.x - x[0], pose.y - x[1]) * np.exp(1j * x[2])
+        return np.array([x[0] + line.real, x[1] + line.imag, x[2] + x[4] * dt, x[3], x[4]])
+
+    step = 1e-5
+    move = np.column_stack([(moved(mean + e) - moved(mean - e)) / (2.0 * step) for e in step * np.eye(5)])
+    ramp = np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]])
+    drive, turn = np.zeros((5, 2)), np.zeros((5, 2))
+    drive[0, 0], drive[1, 0], drive[3, 1] = math.cos(mean[2]), math.sin(mean[2]), 1.0
+    turn[2, 0] = turn[4, 1] = 1.0
+    noise = 0.04 * drive @ ramp @ drive.T + 0.36 * turn @ ramp @ turn.T
+    mean, covariance = moved(mean), move @ covariance @ move.T + noise
+    thinned = 2.0 * 0.05 / dt
+    for rows, value, variances in (
+        ([0, 1, 2], np.array(seen), np.square([7e-4, 7e-4, 8e-3])),
+        ([3, 4], np.array(told[:2]), thinned * np.square(told[2:])),
+    ):
+        see = np.eye(5)[rows]
+        residual = value - see @ mean
+        if rows[0] == 0:
+            residual[2] = wrap(float(residual[2]))
+        gain = covariance @ see.T @ np.linalg.inv(see @ covariance @ see.T + np.diag(variances))
+        rest = np.eye(5) - gain @ see
+        mean = mean + gain @ residual
+        covariance = rest @ covariance @ rest.T + (gain * variances) @ gain.T
+    return mean, covariance

@@ -10,10 +10,12 @@ import pytest
 
 from benchmarks.acquisition import NOISE, SENSORS, Sensor, start, tracker_for
 from benchmarks.estimation import LIMITS
-from estimation.filters.belief import Belief, Model
+from estimation.filters.belief import Model
 from estimation.filters.estimators import ESTIMATORS, make_estimator, settling
+from estimation.filters.gaussian import Gaussian
 from estimation.models.measurement import FrontEnd
-from estimation.tracking.tracker import Tracker, TrackSettings
+from estimation.tracking.track import Tracker
+from estimation.tracking.tracker import TrackSettings
 
 
 @pytest.mark.parametrize("sensor", SENSORS, ids=lambda sensor: str(sensor.name))
@@ -33,7 +35,7 @@ def test_a_speed_that_no_leader_has_does_not_make_its_direction_known(kind: str)
 
     def known(speed: float, sd: float, *, before: bool) -> bool:
         mean = np.array([0.0, 0.0, 0.6 * speed, 0.8 * speed, 0.0])
-        return of.settled(Belief(mean, np.diag([1e-6, 1e-6, sd**2, sd**2, 0.1])), before)
+        return of.settled(Gaussian.of(mean, np.diag([1e-6, 1e-6, sd**2, sd**2, 0.1])), before)
 
     enough = 0.99 * settled * LIMITS.k_v
     assert known(LIMITS.k_v, enough, before=False)

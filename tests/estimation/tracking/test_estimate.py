@@ -1,22 +1,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from estimation.filters.belief import Belief
-from estimation.models.measurement import (
-    Measurement,
-    PoseNoise,
-    measure_body_from_mocap,
-    measure_world,
-)
-from estimation.models.motion import FollowerMotion, Matrix, Vector
+from estimation.filters.gaussian import Gaussian
+from estimation.models.coordinated_turn import FollowerMotion
+from estimation.models.measurement import Measurement, PoseNoise, measure_body_from_mocap, measure_world
+from estimation.models.motion import Matrix, Vector
 from estimation.tracking.estimate import QUANTITIES, Estimate, estimate_of
+from estimation.tracking.track_point import NO_JUMP
 from estimation.tracking.tracker import Status
 from formation.angles import wrap
 from formation.pose import Motion, Pose
@@ -30,9 +26,9 @@ follower_motions = st.builds(Motion, st.floats(-1.0, 1.0), st.floats(-2.0, 2.0))
 SPREAD = np.diag([1e-6, 2e-6, 4e-4, 3e-4, 0.01]) + 1e-7
 
 
-def world_belief(leader: Pose, driven: Motion, covariance: Matrix = SPREAD) -> Belief:
+def world_belief(leader: Pose, driven: Motion, covariance: Matrix = SPREAD) -> Gaussian:
     velocity = driven.v * np.exp(1j * leader.theta)
-    return Belief(np.array([leader.x, leader.y, velocity.real, velocity.imag, driven.u]), covariance)
+    return Gaussian.of(np.array([leader.x, leader.y, velocity.real, velocity.imag, driven.u]), covariance)
 
 
 def mocap_moment(leader: Pose, follower: Pose, motion: Motion, sd: tuple[float, float]) -> Measurement:
@@ -40,8 +36,8 @@ def mocap_moment(leader: Pose, follower: Pose, motion: Motion, sd: tuple[float, 
     return measure_world(5_000, (leader.x, leader.y), follower, NOISE, given_motion)
 
 
-def estimated(belief: Belief, measurement: Measurement) -> Estimate:
-    return estimate_of(belief, measurement, Status.TRACKING, 1.5, 4_000)
+def estimated(belief: Gaussian, measurement: Measurement) -> Estimate:
+    return estimate_of(belief, measurement, Status.TRACKING, 1.5, 4_000, NO_JUMP)
 
 
 @given(poses, leader_motions, poses, follower_motions)
@@ -84,7 +80,7 @@ def test_body_and_world_frame_agree(leader: Pose, driven: Motion, follower: Pose
     mean = np.array([position.real, position.imag, velocity.real, velocity.imag, driven.u])
     motion = FollowerMotion(own.v, own.u, 0.01, 0.02)
     sighting = measure_body_from_mocap(5_000, (leader.x, leader.y), follower, NOISE, motion)
-    body = estimated(Belief(mean, SPREAD), sighting)
+    body = estimated(Gaussian.of(mean, SPREAD), sighting)
     mocap = estimated(world, mocap_moment(leader, follower, own, (0.01, 0.02)))
     for name in ("rho", "rho_dot", "alpha2_dot", "v1", "u1"):
         assert getattr(body, name) == pytest.approx(getattr(mocap, name), abs=1e-11), name
@@ -152,10 +148,8 @@ def test_what_does_not_come_from_the_belief_is_passed_on() -> None:
 
 @pytest.mark.parametrize("mean", [[0.0, 0.0, 0.1, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0, 0.0], [0.0] * 5])
 def test_a_leader_on_the_spot_or_at_rest_gives_numbers(mean: list[float]) -> None:
-    moment = replace(
-        mocap_moment(Pose(0.0, 0.0, 0.0), Pose(0.0, 0.0, 0.0), Motion(0.0, 0.0), (0.01, 0.01)), pose=None
-    )
-    found = estimated(Belief(np.array(mean), SPREAD), moment)
+    moment = Measurement.at(5_000, np.zeros(2), 1e-6 * np.eye(2), FollowerMotion(0.0, 0.0, 0.01, 0.01))
+    found = estimated(Gaussian.of(np.array(mean), SPREAD), moment)
     values = [getattr(found, name) for name in (*QUANTITIES, "rho", "alpha2")]
     assert all(map(math.isfinite, values))
     assert np.isfinite(found.covariance).all()

@@ -12,9 +12,9 @@ from scipy.integrate import solve_ivp
 
 from estimation.filters.belief import Model
 from estimation.filters.estimators import make_estimator
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, PoseNoise, measure_body_from_mocap, measure_world
-from estimation.models.motion import FollowerMotion, LeaderLimits, ProcessNoise
-from estimation.tracking.estimate import Estimate, estimate_of
+from estimation.tracking.estimate import Estimate, estimate_of, joint_of
 from estimation.tracking.foresight import NO_TREND, Foresight, TurnTrend
 from estimation.tracking.prediction import (
     Reported,
@@ -24,6 +24,8 @@ from estimation.tracking.prediction import (
     still_needed,
     with_command,
 )
+from estimation.tracking.track import as_filter
+from estimation.tracking.track_point import NO_JUMP
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray, wrap
 from formation.kernel import entry, interpreted
@@ -51,9 +53,10 @@ def estimate(v2: float = 0.1, u2: float = 0.4, alpha2: float = 1.2) -> Estimate:
         u1=0.6,
         v2=v2,
         u2=u2,
-        covariance=np.eye(5),
+        joint=joint_of(np.eye(5)),
         nis=1.0,
         status=Status.TRACKING,
+        jump=NO_JUMP,
     )
 
 
@@ -204,7 +207,7 @@ def test_an_older_command_that_still_acts_is_not_lost() -> None:
 def test_robots_that_are_predicted_onto_one_point_are_taken_as_they_were_seen() -> None:
     """The leader drives 0.1 m straight to where the follower stands."""
     facing = Estimate(
-        **{name: getattr(estimate(0.0, 0.0), name) for name in Estimate.__slots__}
+        **{name: getattr(estimate(0.0, 0.0), name) for name in Estimate._fields}
         | {"rho": 0.1, "alpha2": 0.0, "alpha1": 0.0, "v1": 0.1, "u1": 0.0}
     )
     assert predict_shape(facing, [], NOW_NS + 1000 * MS, 0.1) == Shape(0.1, 0.0, 0.0)
@@ -214,7 +217,7 @@ def test_robots_that_are_predicted_onto_one_point_are_taken_as_they_were_seen() 
 def test_robots_that_come_to_share_one_coordinate_only_have_a_shape(alpha2: float) -> None:
     """Both stand; the leader is straight ahead of the follower, or abeam of it."""
     still = Estimate(
-        **{name: getattr(estimate(0.0, 0.0, alpha2), name) for name in Estimate.__slots__}
+        **{name: getattr(estimate(0.0, 0.0, alpha2), name) for name in Estimate._fields}
         | {"v1": 0.0, "u1": 0.0}
     )
     turning = [SentCommand(NOW_NS, 0.0, 1.0)]
@@ -266,7 +269,8 @@ def alpha1_errors(kind: str, front_end: FrontEnd, sigma: float) -> tuple[float, 
     """RMS errors of alpha1 predicted over 0.13 s, with u1 held and turned further; nothing is noisy."""
     measure = measure_world if front_end is FrontEnd.WORLD else measure_body_from_mocap
     own, noise = FollowerMotion(0.1, 0.2, 2e-3, 1e-2), PoseNoise(sigma, 0.0035)
-    of, sight = make_estimator(kind, Model(front_end, LIMITS, BY_RULE)), Foresight.of(LIMITS.k_u, BY_RULE.q_u)
+    of = as_filter(make_estimator(kind, Model(front_end, LIMITS, BY_RULE)))
+    sight = Foresight.of(LIMITS.k_u, BY_RULE.q_u)
     pair, ahead, trend = swinging_pair(840), AHEAD * STEP_NS * 1e-9, NO_TREND
     belief, errors = None, []
     for k, (leader, follower) in enumerate(pair[:-AHEAD]):
@@ -274,7 +278,7 @@ def alpha1_errors(kind: str, front_end: FrontEnd, sigma: float) -> tuple[float, 
         belief = (
             of.start(seen) if belief is None else of.update(of.predict(belief, STEP_NS * 1e-9, own), seen)
         )
-        found = estimate_of(belief, seen, Status.TRACKING, 1.0, seen.capture_ns)
+        found = estimate_of(belief, seen, Status.TRACKING, 1.0, seen.capture_ns, NO_JUMP)
         trend = heard(sight, trend, found, ahead)
         if k < 360:
             continue

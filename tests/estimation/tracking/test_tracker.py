@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass
 
 import numpy as np
 import pytest
 
 from estimation.filters.belief import Model
 from estimation.filters.estimators import ESTIMATORS, make_estimator, settling
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import (
     FrontEnd,
     Measurement,
@@ -18,9 +19,10 @@ from estimation.models.measurement import (
     measure_body_from_mocap,
     measure_world,
 )
-from estimation.models.motion import FollowerMotion, LeaderLimits, ProcessNoise
-from estimation.tracking.estimate import Estimate, estimate_of
-from estimation.tracking.tracker import Status, Track, Tracker, TrackSettings, Verdict
+from estimation.tracking.estimate import Estimate, estimate_at
+from estimation.tracking.track import Track, Tracker
+from estimation.tracking.track_point import Verdict
+from estimation.tracking.tracker import Status, TrackSettings
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
 from formation.shape import shape_of
@@ -100,8 +102,7 @@ def status_now(of: Tracker, track: Track) -> Status:
 
 
 def newest(of: Tracker, track: Track) -> Estimate:
-    point = track[-1]
-    return estimate_of(point.belief, point.measurement, status_now(of, track), point.nis, point.used_ns)
+    return estimate_at(track[-1], status_now(of, track))
 
 
 def same(left: object, right: object) -> bool:
@@ -117,7 +118,7 @@ def same(left: object, right: object) -> bool:
 
 def moved(measurement: Measurement, dx: float, dy: float) -> Measurement:
     """The same moment with the leader seen elsewhere, by an offset along the axes of the measurement."""
-    return replace(measurement, position=measurement.position + np.array([dx, dy]))
+    return measurement._replace(x=measurement.x + dx, y=measurement.y + dy)
 
 
 @pytest.mark.parametrize(("kind", "front_end"), CASES)
@@ -284,8 +285,9 @@ def test_after_a_jump_it_is_not_settled_until_it_knows_the_direction_again(
 def test_random_garbage_is_not_swallowed(kind: str, front_end: FrontEnd) -> None:
     run = drive(front_end, 9, 400)
     generator = np.random.default_rng(10)
+    anywhere = generator.uniform(-2.0, 2.0, (60, 2)).tolist()
     garbage = [
-        replace(m, position=generator.uniform(-2.0, 2.0, 2)) if 200 <= k < 260 else m
+        m._replace(x=anywhere[k - 200][0], y=anywhere[k - 200][1]) if 200 <= k < 260 else m
         for k, m in enumerate(run.measurements)
     ]
     of = tracker(kind, front_end)
@@ -336,7 +338,7 @@ def test_a_leader_that_stands_is_never_tracked(
     track: Track = ()
     for measurement in run.measurements:
         track, _ = of.add(track, measurement)
-        assert status_now(of, track) is Status.INITIALISING or track[-1].verdict is Verdict.GATED
+        assert status_now(of, track) is Status.INITIALISING or track[-1].verdict == Verdict.GATED
 
 
 def test_an_empty_track_is_initialising() -> None:
