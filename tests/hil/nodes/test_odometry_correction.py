@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from estimation.own_motion.odometry_correction import IDEAL
+from estimation.own_motion.odometry_history import IDEAL
 from formation.pose import Motion, Pose, advance
 from hil.emulator.lab_messages import frame_message, odometry_message
 from hil.lockstep.lockstep import EPOCH_NS, Lockstep
