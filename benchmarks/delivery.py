@@ -99,9 +99,9 @@ def delivered(node: EstimatorNode, parts: list[list[Event]]) -> tuple[list[Estim
         now_ns = EPOCH_NS + number * HORIZON_NS
         for event in events:
             state, _ = node.step(state, event, now_ns)
-        estimate = node.estimate(state, now_ns)
-        assert estimate is not None
-        found.append(estimate)
+        told = state.memory.estimate(now_ns)
+        assert told is not None
+        found.append(told.estimate)
     return found, state.taken.get("late", 0)
 
 

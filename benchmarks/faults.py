@@ -4,7 +4,7 @@
 
 The pair of the ``turtlebot3`` scenario at 120 Hz drives on undisturbed, and what mocap shows of it is spoilt
 once, at a random instant, for a random time, on a random body. Frames go through the estimator's pure core
-(tracker, estimate, live bound) with noise, odometry and latency of the scenario. Printed for each fault:
+(its memory, live bound) with noise, odometry and latency of the scenario. Printed for each fault:
 estimates with status TRACKING, how many of these have rho_dot, alpha2_dot, v1 or alpha1 more than five of
 their own standard deviations off the truth, how many v1 or alpha1 outside the extended bound that goes out
 with them, frames rejected, and how long after the fault's end it takes until TRACKING: median, p99, maximum,
@@ -29,18 +29,26 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from controllers.laws import independent
 from controllers.limits import Limits
+<<<<<<< HEAD
 from estimation.models.measurement import FrontEnd, measure_body_from_mocap, measure_world
 from estimation.own_motion.odometry_history import History, MotionSample, follower_motion, remember
 from estimation.tracking.estimate import Estimate, estimate_at
 from estimation.tracking.follower_check import NO_DOUBT
 from estimation.tracking.track import Track
 from estimation.tracking.track_point import Verdict
+=======
+from estimation.models.measurement import FrontEnd, PairSeen
+from estimation.own_motion.odometry_history import MotionSample
+from estimation.tracking.estimate import Estimate
+from estimation.tracking.track_point import GATED
+>>>>>>> 37f864f42b09603862c9d401dd9b6e321386fb79
 from estimation.tracking.tracker import Status
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
 from formation.shape import Shape, follower_pose, shape_of, shape_rates
 from hil.emulator.faults import Pair, fault_rows, faulty
 from hil.nodes.estimator import EstimatorNode
+from hil.nodes.estimator_memory import EstimatorMemory
 from hil.scenario.files import load_scenario
 from hil.scenario.parts import gains, leader_program
 from hil.scenario.schema import FaultSection, Scenario
@@ -61,13 +69,13 @@ Make = Callable[[np.random.Generator, float], FaultSection]
 
 @dataclass(frozen=True)
 class Moment:
-    """Truth at one capture: the pair and how it moves; what was shown without fault; odometry so far."""
+    """Truth at one capture: the pair and how it moves; what was shown without fault; odometry of late."""
 
     pair: Pair
     leader: Motion
     follower: Motion
     shown: Pair
-    history: History
+    told: tuple[MotionSample, ...]
 
 
 @dataclass
@@ -101,7 +109,7 @@ def drive(scenario: Scenario, generator: np.random.Generator, frames: int) -> li
     rho = scenario.formation.rho_0 * generator.uniform(0.8, 1.3)
     follower = follower_pose(Shape(rho, -math.pi / 2 + generator.normal(0.0, 0.2), math.pi / 2), leader)
     moments: list[Moment] = []
-    history: History = ()
+    told: list[MotionSample] = []
     settle = 120
     for k in range(-settle, frames):
         driven = program(begin + k * PERIOD)
@@ -113,10 +121,11 @@ def drive(scenario: Scenario, generator: np.random.Generator, frames: int) -> li
         if k % ODOMETRY_EVERY == 0:
             v, u = own.v + generator.normal(0.0, robot.odometry_sigma_v), own.u
             u += generator.normal(0.0, robot.odometry_sigma_u)
-            history = remember(history, MotionSample((k + settle) * PERIOD_NS, v, u), 1.0)
+            told.append(MotionSample((k + settle) * PERIOD_NS, v, u))
         if k >= 0:
             shown = Pair(noisy(leader, scenario, generator), noisy(follower, scenario, generator))
-            moments.append(Moment(Pair(leader, follower), driven, own, shown, history))
+            moments.append(Moment(Pair(leader, follower), driven, own, shown, tuple(told)))
+            told.clear()
         leader = advance(leader, driven.v, driven.u, PERIOD)
         follower = advance(follower, own.v, own.u, PERIOD)
     return moments
@@ -153,33 +162,30 @@ def inject(
     stays = fault is not None and fault.duration_s == STAYS
     at = settling if fault is None else fault.at_s
     end = at if fault is None or stays else at + max(fault.duration_s, PERIOD)
-    doubted = end + node.tracker.settings.doubt_for
+    doubted = end + node.rules.settings.doubt_for
     until = doubted + 1.0 if stays else end + after
-    track: Track = ()
+    memory = EstimatorMemory(node.rules)
     last: Pair | None = None
     back = math.inf
     for k, moment in enumerate(drive(node.scenario, generator, math.ceil(until / PERIOD))):
         t, capture_ns = k * PERIOD, (k + 120) * PERIOD_NS
+        for sample in moment.told:
+            memory.take_odometry(sample)
         faults = fault_rows([] if fault is None else [fault])
         frame = faulty(faults, t, PERIOD, moment.shown, last or moment.shown)
         if frame.lost:
             continue
         last = shown = frame.pair
-        motion = follower_motion(moment.history, capture_ns, node.source.trust)
-        measure = measure_world if node.front_end is FrontEnd.WORLD else measure_body_from_mocap
-        leader = (shown.leader.x, shown.leader.y)
-        track, verdict = node.tracker.add(
-            track, measure(capture_ns, leader, shown.follower, node.pose_noise, motion)
-        )
-        status = node.tracker.status(track, capture_ns)
+        outcome = memory.take_frame(capture_ns, PairSeen(shown.leader.x, shown.leader.y, shown.follower))
+        told = memory.estimate(capture_ns)
         score.frames += 1
-        score.rejected += verdict is Verdict.GATED
-        if t < settling or status is not Status.TRACKING:
+        score.rejected += outcome.verdict == GATED
+        if t < settling or told is None or told.estimate.status != Status.TRACKING:
             continue
         if t >= end - 1e-9:
             back = min(back, t - end)
-        pair, found = moment.pair, estimate_at(track[-1], status)
-        if stays and fault is not None and t > doubted and found.doubt is NO_DOUBT:
+        pair, found = moment.pair, told.estimate
+        if stays and fault is not None and t > doubted and not found.jump.since_ns:
             pair = faulty(fault_rows([fault]), t, PERIOD, pair, pair).pair
         errors = errors_of(found, pair, moment.leader, moment.follower)
         sd = np.sqrt(np.diagonal(found.covariance)).tolist()

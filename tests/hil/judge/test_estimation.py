@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from estimation.consistency.cramer_rao import TruePath, cramer_rao
 from estimation.filters.belief import Model
+from estimation.models.coordinated_turn import LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, PoseNoise
-from estimation.models.motion import LeaderLimits, ProcessNoise
 from formation.angles import wrap
 from hil.judge.columns import Columns, columns_of
 from hil.judge.estimation import judge_estimation
