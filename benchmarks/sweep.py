@@ -24,6 +24,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from estimation.own_motion.inputs import MotionSample
+
 from hil.emulator import node as emulator
 from hil.lockstep.lockstep import EPOCH_NS, Lockstep
 from hil.lockstep.run import START_TIMEOUT_NS, make_nodes
@@ -34,10 +36,31 @@ from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
 from hil.sweep.engine import Engine
 from hil.sweep.tally import judge_run, orbit_of
-from hil.wire import drive_message, intake
+from hil.wire import drive_message
 from hil.wire import message_types as msg
+from hil.wire.message_checks import ANY_TIME_NS, check_frame
+from hil.wire.messages import to_ns
+from hil.wire.records import Body, Frame, FrameHead, Placement, Stamp, Wanted
 
 SEED = 1
+
+
+def frame_of(message: msg.RigidBodies, *_: object, **__: object) -> Frame:
+    """A frame that is an object already, leader first."""
+    bodies: Any = [Body(1, _placement(body.pose)) for body in message.rigidbodies]
+    stamp = Stamp(message.header.stamp.sec, message.header.stamp.nanosec)
+    head = FrameHead(True, stamp, message.frame_number, 0)
+    return check_frame(head, bodies, Wanted(0, 1, ANY_TIME_NS))
+
+
+def _placement(pose: msg.Pose) -> Placement:
+    p, q = pose.position, pose.orientation
+    return Placement(p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+
+
+def motion_of(message: msg.Odometry, now_ns: int) -> MotionSample:
+    twist = message.twist.twist
+    return MotionSample(to_ns(message.header.stamp), twist.linear.x, twist.angular.z)
 
 
 @contextmanager
@@ -50,8 +73,8 @@ def messages_as_objects() -> Iterator[None]:
     receipt = msg.Consumed(0, msg.Time(0, 0))
     with (
         patch.object(nodes, "encode", same),
-        patch.object(intake, "decode_as", same),
-        patch.object(intake, "_decode_frame", same),
+        patch.object(estimator, "read_frame", frame_of),
+        patch.object(estimator, "read_odometry", motion_of),
         patch.object(drive_message, "decode", same),
         patch.object(controller, "decode_as", same),
         patch.object(emulator, "decode_as", same),

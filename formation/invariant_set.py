@@ -22,7 +22,7 @@ from formation.angles import FloatArray, wrap
 from formation.shape import ABREAST_ALPHA1
 from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
-from formation.worst_case_kernels import ESCAPED, LONGEST, half_turn
+from formation.worst_case_kernels import ESCAPED, LONGEST, WorstCase, half_turn
 
 _HALF_TURNS = 2000
 _CLOSED = 1e-9
@@ -53,11 +53,11 @@ class Disturbed:
 
     def _follow(self, rho: float, psi: float, side: float) -> tuple[int, FloatArray, FloatArray]:
         rhos, psis = np.empty(LONGEST), np.empty(LONGEST)
-        v_min, v_max = self.speeds.lowest, self.speeds.highest
-        spacing = self.spacing
-        count = half_turn(
-            rhos, psis, rho, psi, side, v_min, v_max, self.mu1, spacing.rho_0, spacing.mu_rho, self.D
+        speeds, spacing = self.speeds, self.spacing
+        system = WorstCase(
+            side, speeds.lowest, speeds.highest, self.mu1, spacing.rho_0, spacing.mu_rho, self.D
         )
+        count = half_turn(rhos, psis, rho, psi, system)
         return count, rhos, psis
 
 

@@ -85,7 +85,9 @@ def certain_motion(
     if len(back) == 0:
         return Failed.GAP
     ranges = np.empty(4)
-    outcome = intersect(back, moved, blur, A, *speeds, ranges)
+    slowest, fastest = speeds
+    seen = [np.array(values, dtype=np.float64, order="C") for values in (back, moved, blur)]
+    outcome = intersect(seen[0], seen[1], seen[2], A, slowest, fastest, ranges)
     if outcome != CERTAIN:
         return _FAILED[outcome]
     low, high, direction, half = ranges.tolist()

@@ -6,34 +6,17 @@ Importing this module compiles the kernel for its one signature, or loads it fro
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, TypeVar
 
-import numpy as np
-from numba import njit, types
-from numpy.typing import NDArray
-
-Vector = NDArray[np.float64]
-
-_F = TypeVar("_F", bound=Callable[..., object])
+from formation.kernel import entry
+from formation.records import Matrix, Vector
 
 CERTAIN, NOISE, SLOW, ACCELERATION = range(4)
 """What comes out: ranges, or why there are none."""
 
-_ANY_VECTOR = types.Array(types.float64, 1, "A", readonly=True)
-_ANY_MATRIX = types.Array(types.float64, 2, "A", readonly=True)
-_OWN_VECTOR = types.Array(types.float64, 1, "C")
-_FLOAT = types.float64
 
-
-def _compiled(*signature: Any) -> Callable[[_F], _F]:
-    compiled: Callable[[_F], _F] = njit(types.int64(*signature), cache=True, error_model="numpy")
-    return compiled
-
-
-@_compiled(_ANY_VECTOR, _ANY_MATRIX, _ANY_VECTOR, _FLOAT, _FLOAT, _FLOAT, _OWN_VECTOR)
+@entry
 def intersect(
-    back: Vector, moved: Vector, blur: Vector, A: float, slowest: float, fastest: float, ranges: Vector
+    back: Vector, moved: Matrix, blur: Vector, A: float, slowest: float, fastest: float, ranges: Vector
 ) -> int:
     """Fill ``ranges`` (4,) with the least and the largest speed, and the direction's centre and half width.
 
@@ -42,7 +25,8 @@ def intersect(
     """
     low, farthest, least, best = slowest, math.inf, math.inf, 0
     for i in range(len(back)):
-        length, by_blur = math.hypot(moved[i, 0], moved[i, 1]) / back[i], blur[i] / back[i]
+        x, y, by_blur = moved[i, 0] / back[i], moved[i, 1] / back[i], blur[i] / back[i]
+        length = math.sqrt(x * x + y * y)
         if length - by_blur > fastest:
             return NOISE
         radius = by_blur + 0.5 * A * back[i]
@@ -61,10 +45,11 @@ def intersect(
     for i in range(len(back)):
         x, y = moved[i, 0] / back[i], moved[i, 1] / back[i]
         radius = blur[i] / back[i] + 0.5 * A * back[i]
-        if math.hypot(x - best_x, y - best_y) > radius + least:
+        off_x, off_y = x - best_x, y - best_y
+        if math.sqrt(off_x * off_x + off_y * off_y) > radius + least:
             return ACCELERATION
         # A disc is seen from the origin under arcsin(radius / length); a known least speed helps as much.
-        farther = max(math.hypot(x, y), low)
+        farther = max(math.sqrt(x * x + y * y), low)
         if radius >= farther:
             continue
         half = math.asin(radius / farther)

@@ -68,7 +68,20 @@ def lab_of(scenario: Scenario) -> Lab:
 def world_at(begun_ns: int) -> World:
     """A world in which nothing has happened yet, without random numbers."""
     return World(
-        begun_ns, begun_ns, -1, 0, 0, 0, 0, 0, ready=False, stopped=False, shown=False, underway=EMPTY
+        begun_ns=begun_ns,
+        time_ns=begun_ns,
+        capture_due_ns=begun_ns,
+        sample_due_ns=begun_ns,
+        motion_since_ns=-1,
+        frames=0,
+        samples=0,
+        frames_drawn=0,
+        samples_drawn=0,
+        lost=0,
+        ready=False,
+        stopped=False,
+        shown=False,
+        underway=EMPTY,
     )
 
 

@@ -78,6 +78,7 @@ class Lab(NamedTuple):
 class World(NamedTuple):
     """All that changes, besides what is in rows.
 
+    ``capture_due_ns``, ``sample_due_ns``: when the next frame is captured and odometry sampled next.
     ``motion_since_ns``: when the leader set off, -1 before; ``ready``: it may set off with the next frame.
     ``frames``, ``samples``: how many captures and odometry samples there were; ``frames_drawn``,
     ``samples_drawn``: for how many there are random numbers. ``lost``: frames that never arrive. ``shown``: a
@@ -86,6 +87,8 @@ class World(NamedTuple):
 
     begun_ns: int
     time_ns: int
+    capture_due_ns: int
+    sample_due_ns: int
     motion_since_ns: int
     frames: int
     samples: int
@@ -163,21 +166,9 @@ class Step(NamedTuple):
 
 
 @kernel
-def capture_ns(world: World, lab: Lab) -> int:
-    """When the next frame is captured."""
-    return world.begun_ns + whole_ns(world.frames / lab.mocap_rate)
-
-
-@kernel
-def sample_ns(world: World, lab: Lab) -> int:
-    """When odometry is sampled next."""
-    return world.begun_ns + whole_ns(world.samples / lab.odometry_rate)
-
-
-@kernel
-def due_ns(world: World, lab: Lab, memory: Memory) -> int:
+def due_ns(world: World, memory: Memory) -> int:
     """When something happens next."""
-    due = min(capture_ns(world, lab), sample_ns(world, lab))
+    due = min(world.capture_due_ns, world.sample_due_ns)
     if world.underway.length == 0:
         return due
     return min(due, load(Underway, memory.underway, place(world.underway, memory.underway, 0)).release_ns)
@@ -215,7 +206,7 @@ def halted(world: World, lab: Lab, robots: Rows[Robot], now_ns: int) -> World:
 @kernel
 def advanced(world: World, lab: Lab, memory: Memory, until_ns: int) -> Step:
     """World after the next thing that happens until a time: arrivals first, then odometry, then a capture."""
-    now_ns = due_ns(world, lab, memory)
+    now_ns = due_ns(world, memory)
     if now_ns > until_ns:
         return Step(world, Happened(NOTHING, 0, 0, 0, 0, now_ns))
     ring = world.underway
@@ -223,13 +214,13 @@ def advanced(world: World, lab: Lab, memory: Memory, until_ns: int) -> Step:
         first = load(Underway, memory.underway, place(ring, memory.underway, 0))
         if first.release_ns == now_ns:
             world = world._replace(underway=without_oldest(ring, memory.underway, 1))
-            due = due_ns(world, lab, memory)
+            due = due_ns(world, memory)
             happened = Happened(first.kind, first.number, first.at_ns, first.stamp_ns, first.slot, due)
             return Step(world, happened)
     if ring.length == size(memory.underway):
         return Step(world, Happened(NO_ROOM, 0, 0, 0, 0, now_ns))
     slot = load(Underway, memory.underway, place(ring, memory.underway, ring.length)).slot
-    if sample_ns(world, lab) == now_ns:
+    if world.sample_due_ns == now_ns:
         number, kind, drawn = world.samples, SAMPLE, world.samples_drawn
     else:
         number, kind, drawn = world.frames, CAPTURE, world.frames_drawn
@@ -237,7 +228,7 @@ def advanced(world: World, lab: Lab, memory: Memory, until_ns: int) -> Step:
         return Step(world, Happened(NO_NUMBERS, 0, 0, 0, 0, now_ns))
     world = moved(world, lab, memory.robots, now_ns)
     world = sampled(world, lab, memory, slot) if kind == SAMPLE else captured(world, lab, memory, slot)
-    due = due_ns(world, lab, memory)
+    due = due_ns(world, memory)
     return Step(world, Happened(kind, number, now_ns, now_ns, slot, due))
 
 
@@ -245,7 +236,8 @@ def advanced(world: World, lab: Lab, memory: Memory, until_ns: int) -> Step:
 def captured(world: World, lab: Lab, memory: Memory, slot: int) -> World:
     """World after a capture now: the leader's program goes on, and a frame is on its way, or lost."""
     at_ns, number = world.time_ns, world.frames
-    world = _led(world, lab, memory)._replace(frames=number + 1)
+    next_ns = world.begun_ns + whole_ns((number + 1) / lab.mocap_rate)
+    world = _led(world, lab, memory)._replace(frames=number + 1, capture_due_ns=next_ns)
     shares = load(Shares, memory.shares, number % size(memory.shares))
     if lab.delivery.loses(shares) or not _shown(world, lab, memory, number):
         return world._replace(lost=world.lost + 1)
@@ -273,7 +265,8 @@ def sampled(world: World, lab: Lab, memory: Memory, slot: int) -> World:
             error.scale_u * robot.motion.u + moving * error.sigma_u * normal.u,
         )
         store(memory.odometry, slot * robots + k, Odometry(seen_pose(pose_of(robot)), measured))
-    world = world._replace(samples=number + 1)
+    next_ns = world.begun_ns + whole_ns((number + 1) / lab.odometry_rate)
+    world = world._replace(samples=number + 1, sample_due_ns=next_ns)
     told_ns = at_ns + whole_ns(error.delay)
     if told_ns == at_ns:
         return world

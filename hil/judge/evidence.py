@@ -14,12 +14,12 @@ from hil.judge.side_orders import Order, orders_of
 from hil.judge.sound_messages import is_sound
 from hil.log.metadata import IMPORT, mode_of, recorded_certificate, scenario_of
 from hil.log.reader import Log, Record
-from hil.nodes.node import digest
 from hil.scenario.certificate import certificate_json, certificate_of
 from hil.scenario.certify import same_steps
 from hil.scenario.links import Link
 from hil.scenario.schema import Scenario
 from hil.wire import topics
+from hil.wire.events import digest
 from hil.wire.message_types import (
     CertifiedEstimate,
     Command,

@@ -12,7 +12,7 @@ from estimation.tracking.prediction import SentCommand
 from estimation.tracking.track_point import TrackPoint
 from formation.kernel import kernel
 from formation.pose import Motion, Pose
-from formation.records import Rows, part, size
+from formation.records import Rows, part
 from hil.emulator.world import Lab, Memory, World
 from hil.nodes.controller_step import ControlRules, ControlState
 from hil.nodes.estimator_step import Known, Rules
@@ -22,13 +22,22 @@ RUNNING, LANDED, STUCK, SHORT_OF_ROOM, SHORT_OF_NUMBERS = 0, 1, 2, 3, 4
 """Where a run stands: under way, over, its barrier closed for too long, and what it lacks to go on."""
 
 
+class Share(NamedTuple):
+    """Rows of each kind that one follower has."""
+
+    points: int
+    history: int
+    own: int
+    sent: int
+
+
 class Plan(NamedTuple):
     """All that is fixed in a run besides the rules of each follower.
 
     Times are on the simulated clock, which begins at ``world.begun_ns``. patience_ns: until when the leader
     must have set off. duration_ns: from then to the stop. after_ns: how long the run goes on from there.
     judged_from_ns: from when on after the leader's start estimates are kept, -1 for all of them.
-    offset_ns: what is taken off the stamps of frames.
+    offset_ns: what is taken off the stamps of frames. share: of the rows for each follower.
     """
 
     lab: Lab
@@ -37,16 +46,17 @@ class Plan(NamedTuple):
     after_ns: int
     judged_from_ns: int
     offset_ns: int
+    share: Share
 
 
-class Follower(NamedTuple):
-    """One follower's daemons: what its estimator and its controller know, and what they owe to the clock.
+class Clock(NamedTuple):
+    """What one follower's daemons owe to the clock, and what they have said.
 
-    published_ns: of the last estimate, -1 before. estimator_well, controller_well: whether they have said so.
+    tick_ns: of its estimator; report_ns, control_report_ns: when estimator and controller report next;
+    published_ns: of the last estimate, -1 before. estimator_well, controller_well: whether they have said so;
+    commanded: whether its robot has had a command.
     """
 
-    known: Known
-    control: ControlState
     tick_ns: int
     report_ns: int
     control_report_ns: int
@@ -108,7 +118,9 @@ class Rooms(NamedTuple):
     """
 
     lab: Memory
-    followers: Rows[Follower]
+    clocks: Rows[Clock]
+    knowns: Rows[Known]
+    controls: Rows[ControlState]
     rules: Rows[Rules]
     control_rules: Rows[ControlRules]
     points: Rows[TrackPoint]
@@ -123,19 +135,16 @@ class Rooms(NamedTuple):
 
 
 @kernel
-def tracks_of(rooms: Rooms, k: int) -> Tracks:
+def tracks_of(rooms: Rooms, share: Share, k: int) -> Tracks:
     """Rows of the k-th follower's estimator."""
-    n = size(rooms.followers)
-    points, history, own = size(rooms.points) // n, size(rooms.history) // n, size(rooms.own) // n
     return Tracks(
-        part(TrackPoint, rooms.points, k * points, points),
-        part(MotionSample, rooms.history, k * history, history),
-        part(OwnPoint, rooms.own, k * own, own),
+        part(TrackPoint, rooms.points, k * share.points, share.points),
+        part(MotionSample, rooms.history, k * share.history, share.history),
+        part(OwnPoint, rooms.own, k * share.own, share.own),
     )
 
 
 @kernel
-def sent_of(rooms: Rooms, k: int) -> Rows[SentCommand]:
+def sent_of(rooms: Rooms, share: Share, k: int) -> Rows[SentCommand]:
     """Rows of the commands that the k-th follower's controller has on their way."""
-    length = size(rooms.sent) // size(rooms.followers)
-    return part(SentCommand, rooms.sent, k * length, length)
+    return part(SentCommand, rooms.sent, k * share.sent, share.sent)

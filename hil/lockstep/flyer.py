@@ -1,4 +1,4 @@
-"""Runs of one scenario in the compiled loop, each equal to the last bit to a lockstep run of the same seed."""
+"""Runs of one scenario in the compiled loop, each to the last bit the lockstep run of the same seed."""
 
 from __future__ import annotations
 
@@ -27,18 +27,19 @@ from hil.errors import CheckFailedError
 from hil.lockstep.flight import (
     LANDED,
     SHORT_OF_ROOM,
+    Clock,
     Flight,
-    Follower,
     KeptCommand,
     KeptEstimate,
     Order,
     Plan,
     Rooms,
+    Share,
     TrueFrame,
 )
 from hil.lockstep.lockstep import EPOCH_NS
 from hil.nodes.control_rules import control_rules
-from hil.nodes.controller_step import ControlRules, begun
+from hil.nodes.controller_step import ControlRules, ControlState, begun
 from hil.nodes.estimator_memory import HISTORY, room_for, rules_of
 from hil.nodes.estimator_step import Known, Rules
 from hil.scenario.links import links_of
@@ -57,7 +58,11 @@ _SOON_S = 3.0  # nearly every leader has set off by then, with less noise to dra
 _SPARE_S = 0.5
 _NS = 1e-9
 _LEAST_ROOM = 64
+_SPARE_RATE = 1.5  # small rings stay in the processor's cache
 _MORE_COMMANDS_HZ = 25.0  # of the estimator's ticks, and one for the stop
+
+
+_NEW = Clock(EPOCH_NS, EPOCH_NS, EPOCH_NS, -1, estimator_well=False, controller_well=False, commanded=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +82,7 @@ class Flown:
 class Flyer:
     """Flies runs of a scenario that differ by their seed.
 
-    ``judged_from_ns``: from when after the leader's start estimates are kept, -1 for all of them; ``after_s``:
+    ``judged_from_ns``: from when after the leader's start estimates are kept, -1 for all; ``after_s``:
     how long a run goes on past the stop. An estimator that cannot be compiled flies through the same loop in
     plain Python. Raises :class:`~hil.errors.UsageError` as the nodes of the scenario do.
     """
@@ -97,7 +102,15 @@ class Flyer:
         duration_ns = round(scenario.run.duration_s * 1e9)
         offset_ns = round(scenario.estimator.stamp_offset_s * 1e9)
         self._after_s, self._judged_from_ns = after_s, judged_from_ns
-        self._plan = Plan(lab_of(scenario), 0, duration_ns, round(after_s * 1e9), judged_from_ns, offset_ns)
+        control, window = scenario.controller, self._rules[0].settings.window
+        self._share = Share(
+            points=room_for(window, _SPARE_RATE * scenario.mocap.rate_hz),
+            history=room_for(HISTORY, _SPARE_RATE * scenario.robot.odometry_rate_hz),
+            own=room_for(window, _SPARE_RATE * scenario.mocap.rate_hz),
+            sent=rows_for(control.max_age_s + control.transport_s),
+        )
+        after_ns, lab = round(after_s * 1e9), lab_of(scenario)
+        self._plan = Plan(lab, 0, duration_ns, after_ns, judged_from_ns, offset_ns, self._share)
         self._in_flight = _LEAST_ROOM
         self._furnish(_SOON_S)
 
@@ -167,28 +180,28 @@ class Flyer:
         return frames, self._sample_blocks * block_length(Stream.LEADER_ODOMETRY)
 
     def _rooms(self, lab: Memory, frames: int, commands: int) -> Rooms:
-        n, window = self.followers, self._rules[0].settings.window
+        n, share = self.followers, self._share
         rules, controls = rows_of(Rules, n), rows_of(ControlRules, n)
-        points: Any = rows_of(TrackPoint, n * room_for(window))
+        points: Any = rows_of(TrackPoint, n * share.points)
         if self._compiled:
             for k, each in enumerate(self._rules):
                 store(rules, k, each)
         else:
             rules = cast("Rows[Rules]", list(self._rules))
-            points = [None] * (n * room_for(window))
+            points = [None] * (n * share.points)
         for k, pair in enumerate(self._pairs):
             store(controls, k, control_rules(pair))
-        control = self.scenario.controller
-        sent = rows_for(control.max_age_s + control.transport_s)
         return Rooms(
             lab,
-            rows_of(Follower, n),
+            rows_of(Clock, n),
+            rows_of(Known, n),
+            rows_of(ControlState, n),
             rules,
             controls,
             points,
-            rows_of(MotionSample, n * room_for(HISTORY)),
-            rows_of(OwnPoint, n * room_for(window)),
-            rows_of(SentCommand, n * sent),
+            rows_of(MotionSample, n * share.history),
+            rows_of(OwnPoint, n * share.own),
+            rows_of(SentCommand, n * share.sent),
             self._orders,
             rows_of(KeptEstimate, n * (self._in_flight + 1)),
             rows_of(TrueFrame, n * frames),
@@ -210,18 +223,9 @@ class Flyer:
         columns_of(lab.underway)["slot"] = np.arange(len(lab.underway))
         for k, pair in enumerate(self._pairs):
             control = begun(at_station(station(pair)), EPOCH_NS)
-            follower = Follower(
-                Known(EMPTY, EMPTY, EMPTY, IDEAL),
-                control,
-                EPOCH_NS,
-                EPOCH_NS,
-                EPOCH_NS,
-                -1,
-                estimator_well=False,
-                controller_well=False,
-                commanded=False,
-            )
-            store(self.rooms.followers, k, follower)
+            store(self.rooms.clocks, k, _NEW)
+            store(self.rooms.knowns, k, Known(EMPTY, EMPTY, EMPTY, IDEAL))
+            store(self.rooms.controls, k, control)
 
     def _draw(self, seed: int) -> None:
         """The random numbers of a seed."""

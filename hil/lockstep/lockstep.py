@@ -68,5 +68,6 @@ class Lockstep:
         while waiting:
             message = waiting.popleft()
             self.sink(message, self.now_ns)
+            event = Event(message.topic, message.payload)
             for index in self._readers.get(message.topic, ()):
-                waiting.extend(self._step(index, Event(message.topic, message.payload)))
+                waiting.extend(self._step(index, event))

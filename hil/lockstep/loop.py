@@ -41,8 +41,8 @@ from hil.lockstep.flight import (
     SHORT_OF_NUMBERS,
     SHORT_OF_ROOM,
     STUCK,
+    Clock,
     Flight,
-    Follower,
     KeptCommand,
     KeptEstimate,
     Order,
@@ -55,6 +55,7 @@ from hil.lockstep.flight import (
 from hil.nodes import estimator_step
 from hil.nodes.controller_step import (
     ControlRules,
+    ControlState,
     at_time,
     can_be,
     commanded,
@@ -63,7 +64,7 @@ from hil.nodes.controller_step import (
     heard_order,
     heard_stop,
 )
-from hil.nodes.estimator_step import MOCAP, Rules
+from hil.nodes.estimator_step import MOCAP, Known, Rules
 from hil.wire.message_checks import ACCEPTED, place_cause, planar
 from hil.wire.records import Placement
 
@@ -77,15 +78,15 @@ _REPORT_NS = 500_000_000
 @kernel(inline=False)
 def flown(flight: Flight, plan: Plan, rooms: Rooms) -> Flight:
     """Run on until it is over or lacks something; with that given it goes on where it was."""
+    n = size(rooms.clocks)
     while flight.stage == RUNNING:
-        due, first = due_ns(flight.world, plan.lab, rooms.lab), -1
-        n = size(rooms.followers)
+        due, first = due_ns(flight.world, rooms.lab), -1
         for k in range(n):
-            tick_ns = load(Follower, rooms.followers, k).tick_ns
+            tick_ns = load(Clock, rooms.clocks, k).tick_ns
             if tick_ns < due:
                 due, first = tick_ns, k
         for k in range(n):
-            tick_ns = load(Follower, rooms.followers, k).control.next_tick_ns
+            tick_ns = load(ControlState, rooms.controls, k).next_tick_ns
             if tick_ns < due:
                 due, first = tick_ns, n + k
         if due > flight.end_ns:
@@ -95,8 +96,7 @@ def flown(flight: Flight, plan: Plan, rooms: Rooms) -> Flight:
         elif first < n:
             flight = _estimator_tick(flight, plan, rooms, first, due)
         else:
-            before = flight.commands
-            flight = _obeyed(_decided(flight, rooms, first - n, due), plan, rooms, before, due)
+            flight = _controller_tick(flight, plan, rooms, first - n, due)
     return flight
 
 
@@ -107,19 +107,15 @@ def _ended(flight: Flight, plan: Plan, rooms: Rooms) -> Flight:
         return flight._replace(stage=STUCK)
     if flight.world.stopped:
         return flight._replace(stage=LANDED)
-    now_ns = flight.end_ns
+    now_ns, first = flight.end_ns, flight.commands
     flight = flight._replace(world=halted(flight.world, plan.lab, rooms.lab.robots, now_ns))
-    for k in range(size(rooms.followers)):
-        follower = load(Follower, rooms.followers, k)
-        control = heard_stop(at_time(follower.control, now_ns))
-        store(rooms.followers, k, follower._replace(control=control))
-    first = flight.commands
-    for k in range(size(rooms.followers)):
-        flight = _decided(flight, rooms, k, now_ns)
+    for k in range(size(rooms.clocks)):
+        control = heard_stop(at_time(load(ControlState, rooms.controls, k), now_ns))
+        flight = _decided(flight, plan, rooms, k, control, now_ns)
     return _obeyed(flight, plan, rooms, first, now_ns)._replace(end_ns=now_ns + plan.after_ns)
 
 
-@kernel(inline=False)
+@kernel
 def _lab_tick(flight: Flight, plan: Plan, rooms: Rooms, now_ns: int) -> Flight:
     """Everything that is due in the lab now, and what follows from it."""
     waiting = 0
@@ -138,14 +134,14 @@ def _lab_tick(flight: Flight, plan: Plan, rooms: Rooms, now_ns: int) -> Flight:
         elif happened.kind == FRAME:
             waiting = _frame(plan, rooms, happened, now_ns, waiting)
         else:
-            _odometry(flight, plan, rooms, happened, now_ns)
+            _odometry(plan, rooms, happened)
     return _delivered(flight, plan, rooms, waiting, now_ns)
 
 
 @kernel
 def _captured(flight: Flight, plan: Plan, rooms: Rooms, happened: Happened) -> Flight:
     """Keep the truth of a capture, and pass an operator's orders on."""
-    world, n = flight.world, size(rooms.followers)
+    world, n = flight.world, size(rooms.clocks)
     for k in range(n):
         ahead, behind = load(Robot, rooms.lab.robots, k), load(Robot, rooms.lab.robots, k + 1)
         true = TrueFrame(happened.at_ns, pose_of(ahead), pose_of(behind), ahead.motion, behind.motion)
@@ -160,21 +156,20 @@ def _captured(flight: Flight, plan: Plan, rooms: Rooms, happened: Happened) -> F
         order = load(Order, rooms.orders, flight.orders)
         if t < order.at:
             break
-        follower = load(Follower, rooms.followers, 0)
-        control = at_time(follower.control, happened.at_ns)
+        control = at_time(load(ControlState, rooms.controls, 0), happened.at_ns)
         heard = heard_order(control, load(ControlRules, rooms.control_rules, 0), order.sign)
-        store(rooms.followers, 0, follower._replace(control=heard.state))
+        store(rooms.controls, 0, heard.state)
         flight = flight._replace(orders=flight.orders + 1)
     return flight
 
 
-@kernel(inline=False)
+@kernel
 def _frame(plan: Plan, rooms: Rooms, happened: Happened, now_ns: int, waiting: int) -> int:
     """A frame has arrived: every estimator looks at its pair; the number of estimates on their way."""
-    n = size(rooms.followers)
     capture_ns = happened.stamp_ns - plan.offset_ns
     if capture_ns < 0 or capture_ns > now_ns + CLOCK_TOLERANCE_NS:
         return waiting
+    n = size(rooms.clocks)
     for k in range(n):
         first = happened.slot * (n + 1) + k
         leader = _placed(load(SeenPose, rooms.lab.seen, first))
@@ -183,7 +178,7 @@ def _frame(plan: Plan, rooms: Rooms, happened: Happened, now_ns: int, waiting: i
             dx, dy = leader.x - follower.x, leader.y - follower.y
             if math.sqrt(dx * dx + dy * dy) >= _SAME_PLACE:
                 seen = PairSeen(leader.x, leader.y, planar(follower))
-                waiting = _seen(rooms, k, capture_ns, seen, now_ns, waiting)
+                waiting = _seen(plan, rooms, k, capture_ns, seen, now_ns, waiting)
     return waiting
 
 
@@ -193,37 +188,36 @@ def _placed(seen: SeenPose) -> Placement:
     return Placement(seen.x, seen.y, 0.0, 0.0, 0.0, seen.qz, seen.qw)
 
 
-@kernel(inline=False)
-def _seen(rooms: Rooms, k: int, capture_ns: int, seen: PairSeen, now_ns: int, waiting: int) -> int:
-    follower, rules = load(Follower, rooms.followers, k), load(Rules, rooms.rules, k)
-    tracks = tracks_of(rooms, k)
-    taken = estimator_step.take_frame(follower.known, tracks, rules, capture_ns, seen)
-    is_new = taken.verdict != DUPLICATE and taken.verdict != LATE
-    published_ns = now_ns if is_new else follower.published_ns
-    store(rooms.followers, k, follower._replace(known=taken.known, published_ns=published_ns))
-    if not is_new:
+@kernel
+def _seen(
+    plan: Plan, rooms: Rooms, k: int, capture_ns: int, seen: PairSeen, now_ns: int, waiting: int
+) -> int:
+    """The k-th estimator takes in its pair; the number of estimates on their way."""
+    rules, tracks = load(Rules, rooms.rules, k), tracks_of(rooms, plan.share, k)
+    taken = estimator_step.take_frame(load(Known, rooms.knowns, k), tracks, rules, capture_ns, seen)
+    store(rooms.knowns, k, taken.known)
+    if taken.verdict in (DUPLICATE, LATE):
         return waiting
+    store(rooms.clocks, k, load(Clock, rooms.clocks, k)._replace(published_ns=now_ns))
     told = estimator_step.estimate(taken.known, tracks.points, rules, now_ns)
     store(rooms.waiting, waiting, KeptEstimate(k, now_ns, told.estimate))
     return waiting + 1
 
 
 @kernel(inline=False)
-def _odometry(flight: Flight, plan: Plan, rooms: Rooms, happened: Happened, now_ns: int) -> None:
+def _odometry(plan: Plan, rooms: Rooms, happened: Happened) -> None:
     """Odometry has arrived, or was sampled: estimators take theirs, and the leader tells what it drives."""
-    n = size(rooms.followers)
+    n = size(rooms.clocks)
     if happened.kind != SAMPLE or plan.lab.odometry.delay == 0.0:
         for k in range(n):
             told = load(Odometry, rooms.lab.odometry, happened.slot * (n + 1) + k + 1)
             sample = MotionSample(happened.stamp_ns, told.motion.v, told.motion.u)
-            follower = load(Follower, rooms.followers, k)
-            tracks, rules = tracks_of(rooms, k), load(Rules, rooms.rules, k)
-            known = estimator_step.take_odometry(follower.known, tracks, rules, sample)
-            store(rooms.followers, k, follower._replace(known=known))
+            tracks, rules = tracks_of(rooms, plan.share, k), load(Rules, rooms.rules, k)
+            known = load(Known, rooms.knowns, k)
+            store(rooms.knowns, k, estimator_step.take_odometry(known, tracks, rules, sample))
     if happened.kind == SAMPLE:
         u1 = load(Robot, rooms.lab.robots, 0).goal.u
-        follower = load(Follower, rooms.followers, 0)
-        store(rooms.followers, 0, follower._replace(control=heard_leader(follower.control, u1)))
+        store(rooms.controls, 0, heard_leader(load(ControlState, rooms.controls, 0), u1))
 
 
 @kernel(inline=False)
@@ -239,34 +233,32 @@ def _delivered(flight: Flight, plan: Plan, rooms: Rooms, waiting: int, now_ns: i
 def _told(flight: Flight, plan: Plan, rooms: Rooms, kept: KeptEstimate, now_ns: int) -> Flight:
     """An estimate reaches its controller: it is kept if it is to be judged, and leads to a command."""
     since_ns, judged_ns = flight.world.motion_since_ns, plan.judged_from_ns
-    e = kept.estimate
+    k, e = kept.follower, kept.estimate
     if judged_ns < 0 or (since_ns >= 0 and e.capture_ns >= since_ns + judged_ns):
         store(rooms.estimates, flight.estimates, kept)
         flight = flight._replace(estimates=flight.estimates + 1)
-    follower = load(Follower, rooms.followers, kept.follower)
-    control, rules = at_time(follower.control, now_ns), load(ControlRules, rooms.control_rules, kept.follower)
+    control = at_time(load(ControlState, rooms.controls, k), now_ns)
     reported = Reported(
         e.capture_ns, e.measured_ns, e.rho, e.alpha2, e.v1, e.alpha1, e.u1, e.joint.u_u, e.v2, e.u2
     )
     if not can_be(reported, now_ns):
-        store(rooms.followers, kept.follower, follower._replace(control=control))
+        store(rooms.controls, k, control)
         return flight
-    control = heard_estimate(control, rules, reported, e.status, now_ns)
-    store(rooms.followers, kept.follower, follower._replace(control=control))
-    return _decided(flight, rooms, kept.follower, now_ns)
+    control = heard_estimate(control, load(ControlRules, rooms.control_rules, k), reported, e.status, now_ns)
+    return _decided(flight, plan, rooms, k, control, now_ns)
 
 
-@kernel(inline=False)
-def _decided(flight: Flight, rooms: Rooms, k: int, now_ns: int) -> Flight:
+@kernel
+def _decided(flight: Flight, plan: Plan, rooms: Rooms, k: int, control: ControlState, now_ns: int) -> Flight:
     """The k-th controller decides on a command, which is on its way then."""
-    follower, rules = load(Follower, rooms.followers, k), load(ControlRules, rooms.control_rules, k)
-    controlled = commanded(at_time(follower.control, now_ns), rules, sent_of(rooms, k), now_ns)
-    well, report_ns = follower.controller_well, follower.control_report_ns
-    if not now_ns < report_ns <= now_ns + _REPORT_NS:
-        report_ns = now_ns + _REPORT_NS
-        well = well or controlled.state.heard
-    follower = follower._replace(control=controlled.state, control_report_ns=report_ns, controller_well=well)
-    store(rooms.followers, k, follower)
+    rules = load(ControlRules, rooms.control_rules, k)
+    controlled = commanded(control, rules, sent_of(rooms, plan.share, k), now_ns)
+    store(rooms.controls, k, controlled.state)
+    clock = load(Clock, rooms.clocks, k)
+    if not now_ns < clock.control_report_ns <= now_ns + _REPORT_NS:
+        well = clock.controller_well or controlled.state.heard
+        clock = clock._replace(control_report_ns=now_ns + _REPORT_NS, controller_well=well)
+        store(rooms.clocks, k, clock)
     store(rooms.commands, flight.commands, KeptCommand(k, now_ns, controlled.command))
     return flight._replace(commands=flight.commands + 1)
 
@@ -279,34 +271,44 @@ def _obeyed(flight: Flight, plan: Plan, rooms: Rooms, first: int, now_ns: int) -
         sent = load(KeptCommand, rooms.commands, number)
         k, wanted = sent.follower, Motion(sent.command.v, sent.command.u)
         world = robot_commanded(world, plan.lab, rooms.lab.robots, k + 1, wanted, now_ns)
-        store(rooms.followers, k, load(Follower, rooms.followers, k)._replace(commanded=True))
-        if k + 1 < size(rooms.followers):
-            behind = load(Follower, rooms.followers, k + 1)
-            control = heard_leader(behind.control, sent.command.u)
-            store(rooms.followers, k + 1, behind._replace(control=control))
+        if not world.ready:
+            store(rooms.clocks, k, load(Clock, rooms.clocks, k)._replace(commanded=True))
+        if k + 1 < size(rooms.clocks):
+            behind = load(ControlState, rooms.controls, k + 1)
+            store(rooms.controls, k + 1, heard_leader(behind, sent.command.u))
     return flight._replace(world=_readied(world, rooms))
+
+
+@kernel(inline=False)
+def _controller_tick(flight: Flight, plan: Plan, rooms: Rooms, k: int, now_ns: int) -> Flight:
+    """A command leaves, since none has for long."""
+    first = flight.commands
+    control = at_time(load(ControlState, rooms.controls, k), now_ns)
+    return _obeyed(_decided(flight, plan, rooms, k, control, now_ns), plan, rooms, first, now_ns)
 
 
 @kernel(inline=False)
 def _estimator_tick(flight: Flight, plan: Plan, rooms: Rooms, k: int, now_ns: int) -> Flight:
     """Speak up while measurements are missing, and report on the node itself."""
-    follower, rules = load(Follower, rooms.followers, k), load(Rules, rooms.rules, k)
-    known, waiting = follower.known, 0
-    tracks = tracks_of(rooms, k)
+    clock, known, rules = (
+        load(Clock, rooms.clocks, k),
+        load(Known, rooms.knowns, k),
+        load(Rules, rooms.rules, k),
+    )
+    waiting, points = 0, tracks_of(rooms, plan.share, k).points
     if known.track.length > 0:
-        status = status_of(newest(tracks.points, known.track), now_ns, rules.settings)
-        silent = (now_ns - follower.published_ns) * 2 > _ESTIMATOR_TICK_NS
+        status = status_of(newest(points, known.track), now_ns, rules.settings)
         missing = status in (COASTING, LOST)
-        if missing and silent:
-            told = estimator_step.estimate(known, tracks.points, rules, now_ns)
+        if missing and (now_ns - clock.published_ns) * 2 > _ESTIMATOR_TICK_NS:
+            told = estimator_step.estimate(known, points, rules, now_ns)
             store(rooms.waiting, 0, KeptEstimate(k, now_ns, told.estimate))
             waiting = 1
-            follower = follower._replace(published_ns=now_ns)
-    if not now_ns < follower.report_ns <= now_ns + _REPORT_NS:
+            clock = clock._replace(published_ns=now_ns)
+    if not now_ns < clock.report_ns <= now_ns + _REPORT_NS:
         moving = known.own.length if rules.source == MOCAP else known.odometry.length
-        well = follower.estimator_well or (known.track.length > 0 and moving > 0)
-        follower = follower._replace(report_ns=now_ns + _REPORT_NS, estimator_well=well)
-    store(rooms.followers, k, follower._replace(tick_ns=now_ns + _ESTIMATOR_TICK_NS))
+        well = clock.estimator_well or (known.track.length > 0 and moving > 0)
+        clock = clock._replace(report_ns=now_ns + _REPORT_NS, estimator_well=well)
+    store(rooms.clocks, k, clock._replace(tick_ns=now_ns + _ESTIMATOR_TICK_NS))
     flight = _delivered(flight, plan, rooms, waiting, now_ns)
     return flight._replace(world=_readied(flight.world, rooms))
 
@@ -316,8 +318,8 @@ def _readied(world: World, rooms: Rooms) -> World:
     """World in which the leader may set off, once all are well and every robot has had a command."""
     if world.ready:
         return world
-    for k in range(size(rooms.followers)):
-        f = load(Follower, rooms.followers, k)
-        if not (f.estimator_well and f.controller_well and f.commanded):
+    for k in range(size(rooms.clocks)):
+        clock = load(Clock, rooms.clocks, k)
+        if not (clock.estimator_well and clock.controller_well and clock.commanded):
             return world
     return world._replace(ready=True)

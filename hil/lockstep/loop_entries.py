@@ -15,8 +15,8 @@ from hil.emulator.mocap import BodyNormals, SeenPose, Shares
 from hil.emulator.robot import Robot
 from hil.emulator.world import Memory, Odometry, Underway
 from hil.lockstep.flight import (
+    Clock,
     Flight,
-    Follower,
     KeptCommand,
     KeptEstimate,
     Order,
@@ -25,8 +25,8 @@ from hil.lockstep.flight import (
     TrueFrame,
 )
 from hil.lockstep.loop import flown
-from hil.nodes.controller_step import ControlRules
-from hil.nodes.estimator_step import Rules
+from hil.nodes.controller_step import ControlRules, ControlState
+from hil.nodes.estimator_step import Known, Rules
 
 
 @entry
@@ -43,7 +43,9 @@ def fly(
     shown: Rows[Pose],
     seen: Rows[SeenPose],
     odometry: Rows[Odometry],
-    followers: Rows[Follower],
+    clocks: Rows[Clock],
+    knowns: Rows[Known],
+    controls: Rows[ControlState],
     rules: Rows[Rules],
     control_rules: Rows[ControlRules],
     points: Rows[TrackPoint],
@@ -62,9 +64,9 @@ def fly(
         borrowed(odometry_normals), borrowed(underway), borrowed(shown), borrowed(seen), borrowed(odometry),
     )  # fmt: skip
     rooms = Rooms(
-        lab, borrowed(followers), borrowed(rules), borrowed(control_rules), borrowed(points),
-        borrowed(history), borrowed(own), borrowed(sent), borrowed(orders), borrowed(waiting),
-        borrowed(truth), borrowed(estimates), borrowed(commands),
+        lab, borrowed(clocks), borrowed(knowns), borrowed(controls), borrowed(rules),
+        borrowed(control_rules), borrowed(points), borrowed(history), borrowed(own), borrowed(sent),
+        borrowed(orders), borrowed(waiting), borrowed(truth), borrowed(estimates), borrowed(commands),
     )  # fmt: skip
     flight = flown(load(Flight, flights, 0), load(Plan, plans, 0), rooms)
     store(flights, 0, flight)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import cast
-
 from msgspec import Struct, field
 from msgspec.structs import replace
 
@@ -13,7 +11,7 @@ from estimation.tracking.estimate import QUANTITIES
 from estimation.tracking.prediction import Reported, SentCommand, Sight, rows_for
 from estimation.tracking.tracker import Status
 from formation.pose import Motion
-from formation.records import Rows, columns_of, load, row_of, rows_of
+from formation.records import Rows, columns_of, copy_of, load, row_of, rows_of
 from formation.ring import place
 from formation.station import Side
 from hil.nodes.control_rules import control_rules
@@ -123,8 +121,7 @@ class ControllerNode:
         if event.topic:
             state = replace(state, receipts=(*state.receipts, consumed(event, now_ns)))
         happened, cause = self._read(event)
-        control, commands = columns_of(state.control).copy(), columns_of(state.commands).copy()
-        state = replace(state, control=cast("Rows[ControlState]", control), commands=commands)
+        state = replace(state, control=copy_of(state.control), commands=copy_of(state.commands))
         result = rows_of(Command, 1)
         outcome = control_step(state.control, self.rules, state.commands, row_of(happened), result, now_ns)
         if cause := cause or _CAUSES.get(outcome, ""):
@@ -170,12 +167,14 @@ class ControllerNode:
         *,
         fresh: bool,
     ) -> tuple[Outgoing, ...]:
-        seen, sent = state.estimate, Motion(command.v, command.u)
+        # Not by loading all: this is done for each message.
+        row, sent = columns_of(state.control)[0], Motion(command.v, command.u)
+        stamps = row["sight"][["capture_ns", "measured_ns"]].item() if row["known"] else (0, 0)
         drive = drive_message(sent, now_ns, self.topics.follower, stamped=self.topics.stamped)
         record = msg.Command(
             header=header(now_ns, self.topics.follower),
-            capture=to_time(seen.capture_ns if seen else 0),
-            measured=to_time(seen.measured_ns if seen else 0),
+            capture=to_time(stamps[0]),
+            measured=to_time(stamps[1]),
             v2=command.v,
             u2=command.u,
             v2_wanted=command.v_wanted,

@@ -48,9 +48,9 @@ def rules_of(scenario: Scenario) -> Rules:
     )
 
 
-def room_for(seconds: float) -> int:
-    """Places that a ring needs for messages of so many seconds: a power of two."""
-    return 1 << max(_LEAST_ROOM - 1, int(seconds * _FASTEST)).bit_length()
+def room_for(seconds: float, rate: float = _FASTEST) -> int:
+    """Places that a ring needs for messages of so many seconds at a rate [Hz]: a power of two."""
+    return 1 << max(_LEAST_ROOM - 1, int(seconds * rate)).bit_length()
 
 
 class EstimatorMemory:

@@ -142,7 +142,7 @@ def due_pose(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: 
     return own_begun(capture_ns, seen.follower, told, odometry, rules.own_noise)
 
 
-@kernel(inline=False)
+@kernel
 def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
     """Take in a mocap frame that was captured at a time by the host's clock."""
     if rules.source == ODOMETRY:
@@ -185,7 +185,7 @@ def take(known: Known, memory: Memory, rules: Rules, measurement: Measurement) -
     return Taken(known._replace(track=added.ring), added.verdict, cause, late)
 
 
-@kernel(inline=False)
+@kernel
 def take_odometry(known: Known, memory: Memory, rules: Rules, sample: MotionSample) -> Known:
     """Take in a sample of odometry, and fold again what came after the sample before it."""
     ring = remember(memory.history, known.odometry, sample, rules.span)

@@ -6,7 +6,6 @@ calls :meth:`Node.step` and what ``now_ns`` is.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from typing import Protocol, TypeVar
 
@@ -54,12 +53,6 @@ def outgoing(topic: str, message: Message, stamp_ns: int) -> Outgoing:
     return Outgoing(topic, typename_of(message), encode(message), stamp_ns)
 
 
-def digest(topic: str, payload: bytes) -> int:
-    """Identify a payload on a topic by 64 bits of BLAKE2b, so that a log can say what a step consumed."""
-    name = topic.encode()
-    return int.from_bytes(hashlib.blake2b(name + b"\0" + payload, digest_size=8).digest(), "little")
-
-
 def is_due(due_ns: int, period_ns: int, now_ns: int) -> bool:
     """Whether what is to happen every period is due; also if it is so far off that the clock was set back."""
     return not now_ns < due_ns <= now_ns + period_ns
@@ -67,7 +60,7 @@ def is_due(due_ns: int, period_ns: int, now_ns: int) -> bool:
 
 def consumed(event: Event, now_ns: int) -> Consumed:
     """Receipt for an event that a node took in at ``now_ns``."""
-    return Consumed(digest(event.topic, event.payload), to_time(now_ns))
+    return Consumed(event.digest, to_time(now_ns))
 
 
 def no_counts() -> Counts:

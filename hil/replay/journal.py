@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from hil.log.events import Recorded, Timed
-from hil.nodes.node import Node, Outgoing, digest
+from hil.nodes.node import Node, Outgoing
 from hil.wire.events import TICK, Event
 
 S = TypeVar("S")
@@ -62,7 +62,7 @@ class Journey(Generic[S]):
 
 def index_by_digest(events: Iterable[Timed]) -> dict[int, Event]:
     """Events by what receipts call them."""
-    return {digest(event.topic, event.payload): event for event, _ in events}
+    return {event.digest: event for event, _ in events}
 
 
 def refeed(
@@ -129,21 +129,17 @@ def feed(node: Node[S], events: Iterable[Timed]) -> Journey[S]:
     return Journey(node.begin(0) if state is None else state, tuple(outputs))
 
 
-def parity_of(repeated: Sequence[Repeated], topic: str, beside: Mapping[str, Sequence[int]]) -> Parity:
+def parity_of(repeated: Sequence[Repeated], topic: str, beside: Mapping[str, Sequence[bytes]]) -> Parity:
     """Compare repeated outputs with the recorded ones, bit for bit.
 
-    An output agrees if the node put out just that one payload on the topic. ``beside``: what was logged, by
-    digest and in order, on topics that the node sends to as well; an output also differs if the log has
+    An output agrees if the node put out just that one payload on the topic. ``beside``: payloads as
+    logged, in order, on topics that the node sends to as well; an output also differs if the log has
     something else in the place of what went there. What the recorder missed there is only counted.
     """
     wrong = {place for place, step in enumerate(repeated) if not _agrees(step, topic)}
     unrecorded = 0
     for name, logged in beside.items():
-        sent = [
-            (digest(name, payload), place)
-            for place, step in enumerate(repeated)
-            for payload in _payloads(step, name)
-        ]
+        sent = [(payload, place) for place, step in enumerate(repeated) for payload in _payloads(step, name)]
         differing, missed = _compare_in_order(sent, logged)
         wrong |= differing
         unrecorded += missed
@@ -170,27 +166,27 @@ def parity_beside(outputs: Iterable[Outgoing], topic: str, logged: Sequence[byte
     return Parity(compared, len(wrong), min(wrong, default=None), max(0, sent - compared))
 
 
-def _compare_in_order(sent: Sequence[tuple[int, int]], logged: Sequence[int]) -> tuple[set[int], int]:
+def _compare_in_order(sent: Sequence[tuple[bytes, int]], logged: Sequence[bytes]) -> tuple[set[int], int]:
     """Places of what was sent and is logged as something else, and how much is not logged at all.
 
     Both are walked in step. What one has and the other does not is passed over: the recorder can miss a
     message, and others can send on the topic. Only where both happen at once, one was put for the other.
     """
-    to_send, to_come = Counter(name for name, _ in sent), Counter(logged)
+    to_send, to_come = Counter(payload for payload, _ in sent), Counter(logged)
     differing: set[int] = set()
     missed = 0
     at = 0
-    for name, place in sent:
-        lost = to_come[name] == 0
-        while at < len(logged) and logged[at] != name and to_send[logged[at]] == 0:
+    for payload, place in sent:
+        lost = to_come[payload] == 0
+        while at < len(logged) and logged[at] != payload and to_send[logged[at]] == 0:
             to_come[logged[at]] -= 1
             at += 1
             if lost:
                 differing.add(place)
                 break
-        to_send[name] -= 1
-        if at < len(logged) and logged[at] == name:
-            to_come[name] -= 1
+        to_send[payload] -= 1
+        if at < len(logged) and logged[at] == payload:
+            to_come[payload] -= 1
             at += 1
         elif place not in differing:
             missed += 1

@@ -13,7 +13,7 @@ from hil.log.reader import Log
 from hil.nodes.controller import ControllerState
 from hil.nodes.estimator import EstimatorNode, EstimatorState
 from hil.nodes.link_nodes import controller_node, estimator_node
-from hil.nodes.node import Outgoing, digest
+from hil.nodes.node import Outgoing
 from hil.replay.foreign_log import foreign_events
 from hil.replay.journal import Journey, Parity, feed, index_by_digest, parity_beside, parity_of, refeed
 from hil.replay.smoothing import ListeningEstimator, smoothed_estimates
@@ -151,7 +151,7 @@ def _with_commands(
     index = index_by_digest(logged_events(log, node.subscribes))
     journey = refeed(node, node.topics.command, recorded, index)
     drive = node.topics.cmd_vel
-    sent = [digest(event.topic, event.payload) for event, _ in logged_events(log, [drive])]
+    sent = [event.payload for event, _ in logged_events(log, [drive])]
     return Replay(
         link=link,
         estimates=_decoded(estimator.outputs, msg.LeaderEstimate),

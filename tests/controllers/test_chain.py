@@ -11,12 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from controllers import chain_kernels
 from controllers.chain import ChainTrajectory, simulate_chain
 from controllers.laws import LAWS, Gains
 from controllers.limits import Limits
 from formation.angles import FloatArray, wrap
 from formation.closed_loop import IntegrationError, simulate_pair
-from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
+from formation.kernel import interpreted
+from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table, encoded
 from formation.pose import Motion, Pose
 from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2, Shape, follower_pose, shape_of
 from formation.spacing import Spacing
@@ -178,3 +180,17 @@ def test_what_is_no_chain_is_refused() -> None:
         simulate_chain(FIRST, [], IMPULSE, GAINS, FREE, times, knows_turn=True)
     with pytest.raises(ValueError, match="increasing"):
         simulate_chain(FIRST, [ABREAST_SHAPE], IMPULSE, GAINS, FREE, times[::-1], knows_turn=True)
+
+
+@pytest.mark.parametrize("program", PROGRAMS, ids=lambda program: type(program).__name__)
+def test_compiled_and_interpreted_are_the_same(program: LeaderProgram) -> None:
+    gains = Gains(1.0, 2.0, Spacing(0.5, 2.0), Station(Side.LEFT, 1.2), 0.9)
+    leading, table = encoded(program)
+    chain = chain_kernels.Chain(gains.settings(Limits(0.6, 1.5)), leading, True)
+    first = np.array([0.7, gains.station.alpha1, 2.0, 0.6, gains.station.alpha1, 1.0, 0.1, 0.2, 0.3])
+    times, found = np.linspace(0.0, 0.4, 3), []
+    for integrate in (chain_kernels.integrate, interpreted(chain_kernels.integrate)):
+        filled = np.empty((3, 9)), np.empty((3, 3, 3)), np.empty((3, 3, 3))
+        assert integrate(times, chain_kernels.Solver(1e-6, 1e-7, 0.1), first, chain, table, *filled)
+        found.append(b"".join(each.tobytes() for each in filled))
+    assert found[0] == found[1]

@@ -20,6 +20,7 @@ from controllers.limits import Limits
 from formation.angles import FloatArray, wrap
 from formation.closed_loop import IntegrationError
 from formation.flock_places import LEAST_BEARING, may_follow, skein
+from formation.kernel import interpreted
 from formation.leader import Constant, Impulse, LeaderProgram
 from formation.pose import Motion, Pose
 from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2, Shape, shape_of
@@ -249,3 +250,17 @@ def test_what_is_no_flock_is_refused() -> None:
     met[1] = met[0]
     with pytest.raises(IntegrationError, match="flock"):
         flown(met, 1.0, program=program)
+
+
+def test_compiled_and_interpreted_are_the_same() -> None:
+    places = skein(5, SPACING)
+    flock = kernels.Flock(Gains(MU1, MU2, GAINS.spacing, tilt=0.7).settings(Limits(0.55, 2.0)), True)
+    driven, timing = np.tile([V1, 0.2], (21, 1)), kernels.Timing(0.02, 3, 5)
+    first, found = scattered(places, 3, 0.2, 0.4), []
+    for integrate in (kernels.integrate, interpreted(kernels.integrate)):
+        poses, motions, near = np.empty((3, 5, 3)), np.empty((3, 4, 5)), np.empty((3, 5))
+        chosen = np.empty((3, 5, 2), dtype=np.int64)
+        allowed = may_follow(places)
+        assert integrate(driven, timing, first, places, allowed, flock, poses, motions, chosen, near)
+        found.append(b"".join(each.tobytes() for each in (poses, motions, chosen, near)))
+    assert found[0] == found[1]

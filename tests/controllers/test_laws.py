@@ -1,14 +1,28 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controllers.laws import LAWS, Gains, constant_bearing, ideal, ideal_speed, independent, independent_speed
+from controllers.laws import (
+    LAWS,
+    Gains,
+    LawSettings,
+    constant_bearing,
+    ideal,
+    ideal_speed,
+    independent,
+    independent_speed,
+    law,
+    lean,
+)
 from controllers.limits import Limits, clip
+from formation.kernel import entry
+from formation.line import Line, line_of
 from formation.pose import Motion
 from formation.shape import (
     ABREAST_ALPHA1,
@@ -19,6 +33,8 @@ from formation.shape import (
     shape_rates,
 )
 from formation.spacing import Spacing, lyapunov
+from formation.station import Side, Station
+from tests.bits import same_bits
 from tests.formation.shape_rates import reduced_rates
 
 angles = st.floats(-math.pi, math.pi, exclude_min=True)
@@ -141,3 +157,91 @@ def test_gains_without_sense_are_refused(bad: float) -> None:
         Gains(bad, 2.0, GAINS.spacing)
     with pytest.raises(ValueError, match="mu2"):
         Gains(1.5, bad, GAINS.spacing)
+
+
+@entry
+def law_compiled(settings: LawSettings, line: Line, v1: float, u1: float) -> Motion:
+    return law(settings, line, v1, u1)
+
+
+stations = st.builds(Station, st.sampled_from(Side), st.floats(0.2, 2.9))
+tilted = st.builds(
+    Gains, st.floats(0.1, 5), st.floats(0.1, 5), st.builds(Spacing, st.floats(0.1, 1), st.floats(0.1, 30)),
+    stations, st.floats(0.0, 1.5),
+)  # fmt: skip
+
+
+@given(shapes, leaders, tilted)
+def test_compiled_and_interpreted_are_the_same(shape: Shape, leader: Motion, gains: Gains) -> None:
+    numbers, line = gains.settings(Limits(0.22, 2.84)), line_of(shape)
+    same_bits(law_compiled(numbers, line, *leader), law(numbers, line, *leader))
+
+
+@given(shapes, leaders, gains_drawn)
+def test_abreast_on_the_right_it_is_the_papers_to_the_last_bit(
+    shape: Shape, leader: Motion, gains: Gains
+) -> None:
+    """Eqs. (4), (6) and (8) as the paper writes them, f factored."""
+    (rho, alpha1, alpha2), (v1, u1), spacing = shape, leader, gains.spacing
+    f = spacing.mu_rho * ((rho - spacing.rho_0) / rho) * ((rho + spacing.rho_0) / rho)
+    eight = -v1 * math.sin(alpha1) + rho * (v1 * f - gains.mu1 * math.cos(alpha1))
+    six = eight + rho * u1
+    for name, v2 in (("independent", eight), ("ideal", six)):
+        u2 = -gains.mu2 * math.cos(alpha2) + (v1 * math.sin(alpha1) + v2 * math.sin(alpha2)) / rho
+        found = LAWS[name](shape, v1, u1, gains)
+        assert found.v == v2
+        # The cosine enters as 1 * cos + 0 * sin, and a product by -mu2 as one by mu2 of the opposite.
+        assert found.u == u2
+
+
+def test_who_wants_to_stand_does_not_lean() -> None:
+    """The share of the speed that a limit takes has the wanted speed for its divisor."""
+    gains = Gains(1.5, 2.0, Spacing(0.2, 20.0), tilt=1.0)
+    line = Line(0.4, 0.0, -1.0, 0.6, 0.8)
+    tilted, plain = gains.settings(Limits(0.22, 2.84)), GAINS.settings(Limits(0.22, 2.84))
+    assert law(tilted, line, 0.0, 0.0) == law(plain, line, 0.0, 0.0) == Motion(0.0, -1.2)
+    assert lean(tilted, 0.4, 0.0, 0.0) == 0.0
+
+
+@pytest.mark.parametrize("rho", [0.1, 0.4])
+@pytest.mark.parametrize("wanted", [-0.5, 0.5])
+def test_who_cannot_drive_as_fast_leans_by_the_share_that_the_limit_takes(rho: float, wanted: float) -> None:
+    gains = Gains(1.5, 2.0, Spacing(0.2, 20.0), tilt=1.0)
+    driven = math.copysign(0.2, wanted)
+    share = math.copysign(0.6, wanted) * max(-1.0, min(1.0, 1.0 - (0.2 / rho) ** 2))
+    for side in Side:
+        numbers = Gains(1.5, 2.0, gains.spacing, Station(side), 1.0).settings()
+        assert lean(numbers, rho, wanted, driven) == pytest.approx(side.sign * share)
+    assert lean(GAINS.settings(), rho, wanted, driven) == 0.0
+
+
+placed = st.builds(Station, st.sampled_from(Side), st.floats(0.3, math.pi - 0.3))
+
+
+@given(shapes, leaders, st.floats(-3, 3), placed, st.floats(-1.0, 1.0))
+@settings(deadline=None)
+def test_steering_turns_towards_the_stations_bearing_less_the_leaning(
+    shape: Shape, leader: Motion, v2: float, station: Station, lean: float
+) -> None:
+    gains = replace(GAINS, station=station)
+    for leaning_by in (lean, 0.0):
+        u2 = constant_bearing(shape, leader.v, v2, gains, leaning_by)
+        alpha2_dot = shape_rates(shape, leader, Motion(v2, u2)).alpha2_dot
+        off = shape.alpha2 - (station.alpha2 - leaning_by)
+        assert alpha2_dot == pytest.approx(-2.0 * math.sin(off), abs=1e-8)
+
+
+@given(shapes, leaders, placed)
+@settings(deadline=None)
+def test_across_the_line_the_speed_is_that_of_eq_8_at_every_station(
+    shape: Shape, leader: Motion, station: Station
+) -> None:
+    gains = replace(GAINS, station=station)
+    side = 1.0 if station.side is Side.RIGHT else -1.0
+    f = 20.0 * (1.0 - (0.2 / shape.rho) ** 2)
+    restoring = side * leader.v * f - 1.5 * math.sin(shape.alpha1 - station.alpha1)
+    across = -leader.v * math.sin(shape.alpha1) + shape.rho * restoring
+    v2 = independent_speed(shape, leader.v, gains)
+    assert v2 * math.sin(station.alpha2) == pytest.approx(across, rel=1e-9, abs=1e-9)
+    more = ideal_speed(shape, leader.v, leader.u, gains) - v2
+    assert more * math.sin(station.alpha2) == pytest.approx(shape.rho * leader.u, rel=1e-6, abs=1e-9)

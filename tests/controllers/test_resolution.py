@@ -61,3 +61,45 @@ def test_at_a_limit_nothing_piles_up() -> None:
 def test_a_step_that_is_none_is_refused(bad: float) -> None:
     with pytest.raises(ValueError, match="expected a finite number"):
         Resolution(v=bad)
+
+
+@given(wanted_motion, st.floats(-0.005, 0.005), st.floats(-0.02, 0.02))
+def test_each_axis_keeps_its_own_steps_and_its_own_debt(wanted: Motion, owed_v: float, owed_u: float) -> None:
+    uneven = Resolution(0.01, 0.04)
+    sent, rest = uneven.round(wanted, Motion(owed_v, owed_u), LIMITS)
+    for got, left, due, step, bound in (
+        (sent.v, rest.v, wanted.v + owed_v, 0.01, 0.22),
+        (sent.u, rest.u, wanted.u + owed_u, 0.04, 2.84),
+    ):
+        whole = round(got / step)
+        # A hair beyond whole steps, away from zero, so that a link that truncates keeps them.
+        hair = math.copysign(1e-6, whole) if whole else 0.0
+        assert got == pytest.approx(max(-bound, min(bound, (whole + hair) * step)), rel=1e-12)
+        assert abs(due - whole * step) <= 0.5 * step + 1e-12 or abs(whole) == math.floor(bound / step + 1e-6)
+        assert left == pytest.approx(max(-0.5 * step, min(0.5 * step, due - whole * step)), abs=1e-12)
+
+
+def test_one_axis_in_steps_leaves_the_other_alone() -> None:
+    wanted, owed = Motion(0.1234, 1.2345), Motion(0.0, 0.0)
+    sent, rest = Resolution(v=0.01).round(wanted, owed, LIMITS)
+    assert (sent.u, rest.u) == (1.2345, 0.0)
+    assert rest.v == pytest.approx(0.0034, abs=1e-12)
+    sent, rest = Resolution(u=0.01).round(wanted, owed, LIMITS)
+    assert (sent.v, rest.v) == (0.1234, 0.0)
+    assert rest.u == pytest.approx(0.0045, abs=1e-12)
+
+
+def test_a_debt_counts_towards_the_next_command_and_half_a_step_is_rounded_up() -> None:
+    steps = Resolution(0.125, 0.25)
+    sent, rest = steps.round(Motion(0.0625, -0.125), NO_REMAINDER, Limits(1.0, 1.0))
+    assert (sent.v, sent.u) == pytest.approx((0.125, 0.0), abs=1e-6)
+    assert rest == Motion(-0.0625, -0.125)
+    sent, rest = steps.round(Motion(0.125, -0.25), rest, Limits(1.0, 1.0))
+    assert (sent.v, sent.u) == pytest.approx((0.125, -0.25), abs=1e-6)
+    assert rest == Motion(-0.0625, -0.125)
+
+
+def test_a_step_of_turning_that_is_none_is_refused_by_name() -> None:
+    for bad in (-0.01, math.nan, math.inf):
+        with pytest.raises(ValueError, match=r"^u is"):
+            Resolution(u=bad)

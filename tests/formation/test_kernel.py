@@ -23,6 +23,7 @@ from formation.records import (
     Rows,
     borrowed,
     columns_of,
+    copy_of,
     dtype_of,
     load,
     read_byte,
@@ -119,6 +120,14 @@ def test_bytes_are_read_and_written_where_they_lie(byte: int, real: float, signe
 def test_a_row_holds_what_was_put_there() -> None:
     row = row_of(Body(Place(0.1, math.inf), -3, True))
     assert load(Body, row, 0) == Body(Place(0.1, math.inf), -3, True)
+
+
+def test_a_copy_holds_the_same_and_is_another() -> None:
+    rows = bodies()
+    copied_rows = copy_of(rows)
+    assert columns_of(copied_rows).tobytes() == columns_of(rows).tobytes()
+    store(copied_rows, 1, Body(Place(0.0, 0.0), 0, False))
+    assert load(Body, rows, 1) == Body(Place(1.0, 2.0), 5, True)
 
 
 def test_what_no_row_can_hold_is_named() -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import replace
 from typing import Any
 
@@ -10,9 +11,11 @@ import pytest
 from estimation.bounds.bound_check import SpeedInputs, h_of
 from estimation.bounds.certificate import certify
 from estimation.bounds.premises import Premises
-from formation.invariant_set import Disturbed, invariant_set
+from formation.invariant_set import Disturbed, InvariantSet, invariant_set
 from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
+from formation.station import Side
+from formation.steering_margin import steering_margin
 
 TURTLEBOT3 = Premises(
     eps=1.5e-3,
@@ -96,3 +99,160 @@ def test_with_little_noise_the_formation_is_guaranteed_with_wrong_estimates_too(
 def test_sparser_measurements_guarantee_less() -> None:
     sparse = certify(replace(TURTLEBOT3, step=1.0))
     assert sparse.velocity_error > 1.5 * certify(TURTLEBOT3).velocity_error
+
+
+QUIET = replace(TURTLEBOT3, eps=5e-5)
+"""So little noise that the set holds with wrong estimates too."""
+
+UNHELD = replace(TURTLEBOT3, k_u=1.7)
+"""A leader that turns too hard for any set."""
+
+
+def held_of(given: Premises, steered: float) -> InvariantSet:
+    held = invariant_set(Disturbed(given.mu1, given.spacing, given.speeds, steered))
+    assert held is not None
+    return held
+
+
+def largest_h(given: Premises, error: float, held: InvariantSet) -> tuple[float, float]:
+    """Bounds of h, printed and sound, by hand: a dense maximum over believed states and directions."""
+    off = math.asin(error / given.v_eps)
+    ends = np.array([held.rho_min, held.rho_max])
+    rho = np.unique(np.concatenate([ends, np.linspace(held.rho_min, held.rho_max, 101)]))
+    lowest, highest = held.span(rho)
+    shares = np.linspace(0.0, 1.0, 201)[:, np.newaxis]
+    believed = (lowest - off) * (1.0 - shares) + (highest + off) * shares
+    f = given.spacing.mu_rho * (1.0 - (given.spacing.rho_0 / rho) ** 2)
+    turned = np.linspace(-off, off, 41)
+    change = np.max([np.abs(np.cos(believed + each) - np.cos(believed)) for each in turned], axis=0)
+    sound = error / rho + given.mu1 * change + np.abs(f) * error
+    printed = error / rho + given.mu1 + f * math.sqrt(2.0) * error
+    return float(printed.max()), float(sound.max())
+
+
+@pytest.mark.parametrize("given", [TURTLEBOT3, QUIET, replace(TURTLEBOT3, k_u=0.3, mu1=0.8, v_eps=0.06)])
+def test_the_bounds_of_h_are_the_dense_maximum_over_what_may_be_believed_in_the_set(given: Premises) -> None:
+    found = certify(given)
+    printed, sound = largest_h(given, found.velocity_error, held_of(given, given.k_u))
+    assert found.h.figures["sound"] == pytest.approx(sound, rel=2e-3)
+    assert found.h.figures["paper"] == pytest.approx(printed, rel=1e-9)
+    assert "worst over the certified formation" in found.h.assumes
+
+
+@pytest.mark.parametrize("given", [UNHELD, replace(TURTLEBOT3, unproved="a station not abreast")])
+def test_without_a_set_the_bounds_of_h_are_a_sum_at_the_station(given: Premises) -> None:
+    found = certify(given)
+    error, rho_0 = found.velocity_error, given.spacing.rho_0
+    half = 0.5 * math.asin(error / given.v_eps)
+    # A sine changes most across zero: from half the possible error on one side to half on the other.
+    assert found.h.figures["sound"] == pytest.approx(
+        error / rho_0 + given.mu1 * 2.0 * math.sin(half), rel=1e-12
+    )
+    assert found.h.figures["paper"] == pytest.approx(error / rho_0 + given.mu1, rel=1e-12)
+    assert found.rates.figures["M_alpha2"] == pytest.approx(error / rho_0, rel=1e-12)
+    assert "desired distance" in found.rates.assumes[-1]
+    assert "its station" in found.h.assumes[-1]
+
+
+def test_a_velocity_error_that_reaches_the_least_speed_leaves_every_direction_possible() -> None:
+    given = replace(UNHELD, v_eps=0.01)
+    found = certify(given)
+    error = found.velocity_error
+    assert given.v_eps < error
+    assert found.h.figures["sound"] == pytest.approx(error / 0.2 + 2.0 * given.mu1, rel=1e-9)
+    assert found.estimates.figures == {"M_v1": error}
+    exactly = replace(given, v_eps=error)
+    assert certify(exactly).estimates.figures == {"M_v1": error}
+    assert certify(exactly).h.figures["sound"] == found.h.figures["sound"]
+    barely = certify(replace(given, v_eps=error * (1.0 + 1e-9))).estimates.figures
+    assert barely["M_alpha1"] == pytest.approx(0.5 * math.pi, abs=1e-4)
+
+
+def test_the_rates_are_a_sum_done_by_hand() -> None:
+    figures = certify(TURTLEBOT3).rates.figures
+    error = TURTLEBOT3.velocity_error
+    assert figures == {
+        "M_rho": error,
+        "M_alpha2": pytest.approx(error / held_of(TURTLEBOT3, 0.7).rho_min, rel=1e-12),
+        "closed_form": pytest.approx(2.0 * math.sqrt(1.5e-3 * 0.1 * 0.7), rel=1e-12),
+        "eps": 1.5e-3,
+        "acceleration": pytest.approx(0.1 * 0.7, rel=1e-12),
+    }
+    assert "certified formation" in certify(TURTLEBOT3).rates.assumes[-1]
+
+
+def test_the_set_with_errors_is_the_one_whose_errors_enlarge_it_to_itself() -> None:
+    found = certify(QUIET)
+    steered = QUIET.k_u
+    for _ in range(15):
+        steered = QUIET.k_u + largest_h(QUIET, found.velocity_error, held_of(QUIET, steered))[1]
+    figures, held = found.formation_with_errors.figures, held_of(QUIET, steered)
+    assert figures["rho_min"] == pytest.approx(held.rho_min, rel=1e-3)
+    assert figures["rho_max"] == pytest.approx(held.rho_max, rel=1e-3)
+    assert figures["alpha1_min"] == pytest.approx(held.alpha1_min, rel=1e-3)
+    assert figures["alpha1_max"] == pytest.approx(held.alpha1_max, rel=1e-3)
+    # What is printed is closed in itself: no steering is left in it that it was not made for.
+    said = float(found.formation_with_errors.assumes[2].rpartition(", ")[2].removesuffix(" rad/s"))
+    assert said == pytest.approx(steered - QUIET.k_u, rel=1e-2)
+
+
+def mirrored(figures: dict[str, float]) -> dict[str, float]:
+    low, high = figures["alpha1_min"], figures["alpha1_max"]
+    return figures | {"alpha1_min": -high, "alpha1_max": -low}
+
+
+def test_on_the_left_the_formation_is_the_mirror_image() -> None:
+    right, left = certify(QUIET), certify(replace(QUIET, side=Side.LEFT))
+    held = held_of(QUIET, QUIET.k_u)
+    assert right.formation.figures == {
+        "rho_min": held.rho_min,
+        "rho_max": held.rho_max,
+        "alpha1_min": held.alpha1_min,
+        "alpha1_max": held.alpha1_max,
+    }
+    for name in ("formation", "formation_with_errors"):
+        assert left.claims()[name].figures == mirrored(right.claims()[name].figures)
+    assert (left.h, left.rates) == (right.h, right.rates)
+
+
+def test_any_speed_means_every_speed_that_the_leader_may_drive() -> None:
+    given = replace(TURTLEBOT3, k_u=0.3)
+    anywhere = certify(replace(given, speeds=SpeedRange(given.v_eps, given.k_v)))
+    assert certify(given).formation_any_speed.figures == anywhere.formation.figures != {}
+    assert "anywhere between 0.04 and 0.1" in certify(given).formation_any_speed.assumes[1]
+    assert "constant" in certify(given).formation.assumes[1]
+
+
+def test_the_margin_of_steering_is_that_of_a_constant_speed() -> None:
+    margin = steering_margin(1.5, TURTLEBOT3.spacing, 0.08)
+    assert certify(TURTLEBOT3).k_u_star.figures == {"lower": margin.lower, "upper": margin.upper}
+
+
+def test_where_the_theory_does_not_speak_nothing_is_said_of_the_formation() -> None:
+    found = certify(replace(QUIET, unproved="a station not abreast"))
+    names = ("formation", "formation_any_speed", "formation_with_errors", "k_u_star")
+    for name in names:
+        assert (found.claims()[name].figures, found.claims()[name].why) == ({}, "a station not abreast")
+    assert list(found.claims()) == ["rates", "estimates", "h", "alpha2_ultimate", *names]
+
+
+def test_steering_that_noise_may_outweigh_has_no_ultimate_bound() -> None:
+    M_alpha2 = certify(TURTLEBOT3).rates.figures["M_alpha2"]
+    assert certify(replace(TURTLEBOT3, mu2=M_alpha2)).alpha2_ultimate.figures == {}
+    just = certify(replace(TURTLEBOT3, mu2=M_alpha2 * (1.0 + 1e-9))).alpha2_ultimate.figures
+    assert just["value"] == pytest.approx(0.5 * math.pi, abs=1e-4)
+
+
+def test_a_turn_that_no_distance_balances_is_told_from_a_saddle() -> None:
+    reach = TURTLEBOT3.spacing.mu_rho * 0.08
+    balanced = certify(replace(TURTLEBOT3, k_u=math.nextafter(reach, 0.0))).formation.why
+    assert "saddle" in str(balanced)
+    assert "constant turn" in str(certify(replace(TURTLEBOT3, k_u=reach)).formation.why)
+
+
+def test_a_set_that_keeps_growing_is_not_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules[certify.__module__], "_ROUNDS", 1)
+    found = certify(replace(QUIET, noise="in other words")).formation_with_errors
+    assert found.figures == {}
+    assert found.assumes == ("estimates as wrong as the sound bound of h allows",)
+    assert "keep enlarging each other" in str(found.why)

@@ -187,3 +187,22 @@ def test_impossible_error_bounds_are_refused_by_name(bad: float) -> None:
         RateErrors(0.1, bad)
     with pytest.raises(ValueError, match="E_v2"):
         InputErrors(E_v2=bad)
+
+
+@pytest.mark.parametrize("name", ["M_rho", "M_alpha2"])
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -1e-9])
+def test_one_impossible_number_in_an_array_of_rate_errors_is_refused(name: str, bad: float) -> None:
+    arrays = {"M_rho": np.full(3, 0.1), "M_alpha2": np.full(3, 0.1)}
+    assert RateErrors(**arrays).M_rho is arrays["M_rho"]
+    arrays[name][1] = bad
+    with pytest.raises(ValueError, match=name):
+        RateErrors(**arrays)
+
+
+@pytest.mark.parametrize("name", ["E_rho", "E_alpha2", "E_v2", "E_u2"])
+def test_every_input_error_is_looked_at(name: str) -> None:
+    assert InputErrors() == InputErrors(0.0, 0.0, 0.0, 0.0)
+    with pytest.raises(ValueError, match=name):
+        InputErrors(**{name: np.array([0.1, math.nan])})
+    with pytest.raises(ValueError, match=name):
+        InputErrors(**{name: -0.1})

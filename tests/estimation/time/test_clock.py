@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -162,3 +163,149 @@ def test_lines_and_percentiles_need_something_to_go_by() -> None:
         lower_line([])
     with pytest.raises(ValueError, match="no delays"):
         jitter_of([])
+
+
+def shown(k: int, capture_ns: int, delay_ns: int) -> Arrival:
+    return Arrival(k, capture_ns, capture_ns + delay_ns)
+
+
+def test_exactly_the_last_minute_is_kept_and_of_each_second_the_least_delay() -> None:
+    second = 1_000_000_000
+    begin_ns = 1_700_000_000 * second
+    made = []
+    for k in range(150):
+        made += [
+            shown(2 * k, begin_ns + k * second, (20 + k % 7) * MS),
+            shown(2 * k + 1, begin_ns + k * second + second // 2, (20 + (k + 3) % 7) * MS),
+        ]
+    clock = NOTHING_HEARD
+    for arrival in made:
+        clock = heard(clock, arrival)
+        now_s = arrival.capture_ns // second
+        slots: dict[int, list[Arrival]] = {}
+        for each in made[: arrival.number + 1]:
+            slots.setdefault(each.capture_ns // second, []).append(each)
+        least = [min(those, key=lambda each: each.delay_ns) for those in slots.values()]
+        # What is older than a minute leaves when a new second begins, and not before.
+        begun_ns = slots[now_s][0].capture_ns - 60 * second
+        assert clock.lowest == tuple(each for each in least if each.capture_ns >= begun_ns)
+    assert clock.frames == 300
+    assert len(clock.recent) == 300
+
+
+def test_a_frame_that_comes_out_of_order_leaves_the_newest_alone_and_counts_as_one() -> None:
+    made = arrivals([0.0] * 240)
+    clock = folded(made[:200] + made[201:])
+    late = shown(200, made[200].capture_ns, LATENCY_NS + 12 * MS)
+    after = heard(clock, late)
+    assert after.newest == clock.newest == made[-1]
+    assert after.frames == clock.frames + 1
+    assert after.recent[-1] == late
+    assert after.lowest == clock.lowest
+    again = heard(after, replace(made[-1], number=999))
+    assert again.newest == made[-1]
+
+
+def test_of_the_delays_the_last_512_are_kept() -> None:
+    made = arrivals([0.0] * 700)
+    assert folded(made).recent == tuple(made[-512:])
+
+
+def test_it_is_known_after_five_frames_over_a_quarter_of_a_second() -> None:
+    quarter = 250 * MS
+
+    def spread(count: int, span_ns: int) -> Clock:
+        step = span_ns // (count - 1)
+        captures = [BEGIN_NS + k * step for k in range(count - 1)] + [BEGIN_NS + span_ns]
+        return folded([shown(k, at_ns, LATENCY_NS) for k, at_ns in enumerate(captures)])
+
+    assert spread(5, quarter).known
+    assert not spread(4, quarter).known
+    assert not spread(5, quarter - 1).known
+    assert not NOTHING_HEARD.known
+
+
+def test_drift_is_told_over_ten_seconds_and_no_less() -> None:
+    def line(span_ns: int) -> list[tuple[int, int]]:
+        return [(BEGIN_NS, 0), (BEGIN_NS + span_ns, 100_000)]
+
+    long = lower_line(line(10_000 * MS))
+    assert long.slope == pytest.approx(1e-5, rel=1e-9)
+    assert long.at_ns(BEGIN_NS) == 0
+    assert long.error == pytest.approx(1e-6, rel=1e-9)
+    assert long.slope_error == pytest.approx(2e-7, rel=1e-9)
+    short = lower_line(line(10_000 * MS - 1))
+    assert (short.slope, short.at_ns(BEGIN_NS), short.slope_error) == (0.0, 0, np.inf)
+    assert short.error == pytest.approx(1e-6, rel=1e-9)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_no_line_is_steeper_than_a_clock_drifts(sign: int) -> None:
+    points = [(BEGIN_NS + k * 1000 * MS, sign * k * 2 * MS) for k in range(13)]
+    assert lower_line(points).slope == sign * 5e-4
+
+
+def test_the_error_of_a_line_is_twice_the_mean_distance_of_what_lies_above_it() -> None:
+    heights = [0, 3 * MS, 0, 6 * MS, 50 * MS]
+    points = [(BEGIN_NS + k * 1000 * MS, height) for k, height in enumerate(heights)]
+    # The slot of the newest point goes on, so that it does not count.
+    assert lower_line(points).error == pytest.approx(2.0 * 9e-3 / 4.0 + 1e-6, rel=1e-9)
+    assert lower_line(points[:1]).error == pytest.approx(1e-6, rel=1e-9)
+
+
+def test_percentiles_are_of_nearest_rank() -> None:
+    found = jitter_of([float(k) for k in range(200, 0, -1)])
+    assert (found.p50, found.p99, found.largest) == (100.0, 198.0, 200.0)
+
+
+def late_ones(count: int, span_ns: int, above_ns: int, back_ns: int = 0) -> list[Arrival]:
+    """So many arrivals over a span, all delayed beyond the line, with captures that lie back."""
+    begin_ns = BEGIN_NS + 5_000 * MS
+    made = []
+    for k in range(count):
+        receive_ns = begin_ns + k * span_ns // (count - 1)
+        made.append(Arrival(600 + k, receive_ns - LATENCY_NS - above_ns - back_ns, receive_ns))
+    return made
+
+
+def test_a_jump_is_five_frames_over_a_fifth_of_a_second_by_more_than_50_ms() -> None:
+    before = folded(arrivals([0.0] * 601))
+    fifth = 200 * MS
+    for count, span_ns, early_ns, jumps in (
+        (5, fifth, 51 * MS, 1),
+        (4, fifth, 51 * MS, 0),
+        (5, fifth - 1, 51 * MS, 0),
+        (5, fifth, 50 * MS, 0),
+    ):
+        assert folded(late_ones(count, span_ns, -early_ns), before).jumps == jumps, (count, span_ns)
+
+
+def test_what_is_late_has_jumped_only_if_captured_long_before_one_of_a_lower_number() -> None:
+    before = folded(arrivals([0.0] * 601))
+    assert folded(late_ones(5, 200 * MS, 200 * MS), before).jumps == 1
+    # Held up on the way, and in order: the network's doing.
+    slow = [
+        Arrival(601 + k, BEGIN_NS + 5_010 * MS + k * MS, BEGIN_NS + 5_300 * MS + k * 60 * MS)
+        for k in range(5)
+    ]
+    assert folded(slow, before).jumps == 0
+    assert folded(slow, before).suspects == ()
+
+
+def test_suspects_on_the_other_side_and_good_frames_begin_the_count_again() -> None:
+    before = folded(arrivals([0.0] * 601))
+    early, late = late_ones(5, 200 * MS, -80 * MS), late_ones(5, 200 * MS, 80 * MS)
+    mixed = [early[0], late[1], early[2], late[3], early[4]]
+    assert folded(mixed, before).jumps == 0
+    assert len(folded(mixed, before).suspects) == 1
+    good = shown(700, early[2].receive_ns - LATENCY_NS, LATENCY_NS)
+    assert folded([*early[:2], good], before).suspects == ()
+    assert folded([*early[:2], good, *early[2:]], before).jumps == 0
+
+
+def test_after_a_jump_the_epoch_is_made_of_the_frames_that_showed_it() -> None:
+    before = folded(arrivals([0.0] * 601))
+    early = late_ones(5, 200 * MS, -80 * MS)
+    after = folded(early, before)
+    assert (after.frames, after.since_ns, after.recent) == (5, early[0].receive_ns, tuple(early))
+    assert after.newest == early[-1]

@@ -343,3 +343,40 @@ def test_a_leader_that_stands_is_never_tracked(
 
 def test_an_empty_track_is_initialising() -> None:
     assert tracker("ekf", FrontEnd.WORLD).status((), 0) is Status.INITIALISING
+
+
+@pytest.mark.parametrize("v", [0.1, -0.1])
+@pytest.mark.parametrize("gap", [1, 20])
+@pytest.mark.parametrize("angle", [0.3, 1.8, -2.2, -0.8])
+def test_a_follower_may_be_off_by_what_its_noise_and_motion_leave_in_any_direction_and_gear(
+    v: float, gap: int, angle: float
+) -> None:
+    own, leader = Motion(v, 0.4), Pose(0.4, 0.5, 0.0)
+    measured = FollowerMotion(own.v, own.u, 5e-3, 3e-2)
+    of = tracker("ekf", FrontEnd.WORLD)
+    follower = last = Pose(-0.5, 0.3, 0.9)
+    track: Track = ()
+    for k in range(120):
+        seen = measure_world(EPOCH_NS + k * FRAME_NS, (leader.x, leader.y), follower, NOISE, measured)
+        track, verdict = of.add(track, seen)
+        assert verdict in (Verdict.USED, Verdict.RESTARTED)
+        leader, last = advance(leader, 0.08, 0.0, FRAME_NS * 1e-9), follower
+        follower = advance(follower, own.v, own.u, FRAME_NS * 1e-9)
+    # By hand: a tenth of each motion for slip, and both standard deviations grow with time.
+    dt = gap * FRAME_NS * 1e-9
+    here = advance(last, own.v, own.u, dt)
+    leader = advance(Pose(0.4, 0.5, 0.0), 0.08, 0.0, (119 + gap) * FRAME_NS * 1e-9)
+    sd_heading = (3e-2 + 0.1 * 0.4) * dt
+    sd_position = (5e-3 + 0.1 * 0.1 + 0.1 * sd_heading) * dt
+    gate = -2.0 * math.log(1e-4)
+    reach = math.sqrt(gate * (2.0 * NOISE.position**2 + sd_position**2))
+    turn = math.sqrt(gate * (2.0 * NOISE.heading**2 + sd_heading**2))
+    for share, expected in ((0.99, Cause.NONE), (1.01, Cause.FOLLOWER)):
+        aside = replace(
+            here, x=here.x + share * reach * math.cos(angle), y=here.y + share * reach * math.sin(angle)
+        )
+        for pose in (aside, replace(here, theta=here.theta + math.copysign(share * turn, angle))):
+            at_ns = EPOCH_NS + (119 + gap) * FRAME_NS
+            after, verdict = of.add(track, measure_world(at_ns, (leader.x, leader.y), pose, NOISE, measured))
+            assert after[-1].cause == expected
+            assert verdict is (Verdict.USED if expected is Cause.NONE else Verdict.GATED)

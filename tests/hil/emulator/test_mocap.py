@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from hil.wire.intake import read_frame
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom, kstest
@@ -28,6 +27,7 @@ from hil.emulator.mocap import (
 )
 from hil.emulator.robot import standing
 from hil.wire.messages import encode
+from hil.wire.reading import read_frame
 
 DELIVERY = Delivery(latency=0.03, jitter=0.02, loss=0.05)
 COUNT = 4000

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from estimation.consistency.cramer_rao import TruePath, cramer_rao
 from estimation.filters.belief import Model
+from estimation.models.coordinated_turn import LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, PoseNoise
-from estimation.models.motion import LeaderLimits, ProcessNoise
 from formation.angles import wrap
 from hil.judge.columns import Columns, columns_of
 from hil.judge.estimation import judge_estimation
@@ -91,3 +91,27 @@ def test_efficiency_is_against_the_whole_bound(short_log: Log) -> None:
     for name, bound in bounds.items():
         best = math.sqrt(float(np.mean(bound[rows] ** 2)))
         assert efficiency[name] == pytest.approx(rmse[name] / best, rel=0.005)
+
+
+def test_where_the_truth_is_known_for_a_part_only_that_part_is_judged(exact_evidence: Evidence) -> None:
+    """The larger errors lie where nobody knows: neither the worst nor the mean may show them, nor be lost."""
+    columns = columns_of(exact_evidence)
+    count = len(columns.samples.capture_ns)
+    known = np.arange(count) < count // 2
+    v1 = columns.true.v1 + np.where(np.arange(count) % 2 == 0, 0.002, -0.004)
+    v1[~known] += 9.0
+    samples = replace(columns.samples, seen=replace(columns.samples.seen, v1=v1))
+    true = replace(columns.true, v1=np.where(known, columns.true.v1, math.nan))
+    found = judge_estimation(exact_evidence, replace(columns, samples=samples, true=true))
+    worst, rmse, share = found["max"], found["rmse"], found["coverage_3sigma"]
+    assert isinstance(worst, dict)
+    assert isinstance(rmse, dict)
+    assert isinstance(share, dict)
+    assert worst["v1"] == pytest.approx(0.004, abs=1e-12)
+    assert rmse["v1"] == pytest.approx(math.sqrt(0.5 * (0.002**2 + 0.004**2)), rel=1e-2)
+    assert share["v1"] == pytest.approx(0.5, abs=0.02)
+    unknown = replace(columns.true, v1=np.full(count, math.nan))
+    nothing = judge_estimation(exact_evidence, replace(columns, true=unknown))["max"]
+    assert isinstance(nothing, dict)
+    assert "v1" not in nothing
+    assert "alpha1" in nothing

@@ -13,10 +13,10 @@ from hil.judge.summary import summarise
 from hil.log.metadata import log_metadata
 from hil.log.reader import Log, read_log
 from hil.log.writer import LogWriter
-from hil.nodes.node import digest
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
+from hil.wire.events import digest
 from hil.wire.message_types import Consumed, RigidBodies
 from hil.wire.messages import decode_as, encode, header, to_ns, to_time, typename_of
 

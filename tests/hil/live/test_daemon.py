@@ -15,12 +15,12 @@ from hil.lockstep.run import make_nodes
 from hil.log.events import recorded_commands, recorded_estimates
 from hil.log.metadata import scenario_of
 from hil.log.reader import Log, read_log
-from hil.nodes.node import Outgoing, digest, outgoing
+from hil.nodes.node import Outgoing, outgoing
 from hil.replay.rerun import replay
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
 from hil.wire import topics
-from hil.wire.events import TICK, Event
+from hil.wire.events import TICK, Event, digest
 from hil.wire.message_types import String
 from hil.wire.pubsub import Inbox, Wire
 from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint

@@ -7,11 +7,14 @@ import subprocess
 import sys
 import textwrap
 import tracemalloc
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
+from mcap.records import Statistics, SummaryOffset
+from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
@@ -221,3 +224,32 @@ def test_a_long_run_takes_little_memory_for_the_index_of_its_log(tmp_path: Path)
         tracemalloc.stop()
     assert held[-1] - held[100] < 500 * 400
     assert read_log(tmp_path / "long.mcap").messages == 4800
+
+
+def test_the_summary_counts_what_is_there_and_points_at_it(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with LogWriter(path, METADATA) as log:
+        fill(log, 300)
+        log.add_metadata({"verdict": {"ok": "yes"}})
+    raw = path.read_bytes()
+    with path.open("rb") as stream:
+        records = list(StreamReader(stream, emit_chunks=True).records)
+    kinds = Counter(type(record).__name__ for record in records)
+    (said,) = (record for record in records if isinstance(record, Statistics))
+    assert said.message_count == 300
+    assert said.chunk_count == kinds["Chunk"] == kinds["ChunkIndex"] > 1
+    assert said.attachment_count == kinds["Attachment"] == 0
+    assert said.metadata_count == kinds["Metadata"] == kinds["MetadataIndex"] == 3
+    assert (said.channel_count, said.schema_count) == (2, 1)
+    assert sorted(said.channel_message_counts.values()) == [100, 200]
+    assert said.message_start_time == START_NS
+    assert said.message_end_time == START_NS + 299 * 2_000_000
+    offsets = [record for record in records if isinstance(record, SummaryOffset)]
+    assert {each.group_opcode for each in offsets} == {0x03, 0x04, 0x08, 0x0B, 0x0D}
+    for each in offsets:
+        at, end = each.group_start, each.group_start + each.group_length
+        while at < end:
+            assert raw[at] == each.group_opcode
+            at += 9 + int.from_bytes(raw[at + 1 : at + 9], "little")
+        assert at == end
+        assert raw[end] != each.group_opcode

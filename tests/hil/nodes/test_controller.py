@@ -14,12 +14,12 @@ from estimation.tracking.tracker import Status
 from formation.pose import Motion
 from hil.lockstep.lockstep import EPOCH_NS
 from hil.nodes.controller import ControllerNode, ControllerState
-from hil.nodes.node import Outgoing, digest
+from hil.nodes.node import Outgoing
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.drive_message import drive_message
-from hil.wire.events import TICK, Event
+from hil.wire.events import TICK, Event, digest
 from hil.wire.messages import decode_as, encode, header, to_ns, to_time
 
 MS = 1_000_000
@@ -268,3 +268,70 @@ def test_the_ideal_law_waits_for_the_leaders_turn_rate_and_uses_it() -> None:
     _, other, _ = fed([(NOW_NS, Event(told, straight)), (NOW_NS, TICK)], node, state)
     # Eq. (6) asks for rho * u1 more, at the distance that is predicted.
     assert commands[-1].v2_wanted - other[-1].v2_wanted == pytest.approx(0.25 * 0.5, rel=0.2)
+
+
+def reported(state: ControllerState, node: ControllerNode = NODE) -> dict[str, str]:
+    (status,) = decode_as(node.report(state, NOW_NS).payload, msg.DiagnosticArray).status
+    return {each.key: each.value for each in status.values}
+
+
+def test_every_decision_is_counted_under_its_name() -> None:
+    events = [
+        (NOW_NS, TICK),
+        (NOW_NS, estimate()),
+        (NOW_NS + 20 * MS, TICK),
+        (NOW_NS + 40 * MS, TICK),
+        (NOW_NS + 40 * MS, estimate(status=4)),
+        (NOW_NS + 41 * MS, Event(NODE.topics.estimate, b"\x01")),
+        (NOW_NS + 42 * MS, STOP),
+        (NOW_NS + 62 * MS, TICK),
+    ]
+    state, commands, _ = fed(events)
+    expected = {"no estimate": 1, "driving": 3, "lost": 1, "stopped": 2}
+    assert dict(state.decided) == expected
+    assert len(commands) == sum(expected.values())
+    said = reported(state)
+    assert {key: value for key, value in said.items() if key.startswith("decided.")} == {
+        f"decided.{name}": str(count) for name, count in expected.items()
+    }
+    assert said["refused.malformed"] == "1"
+    assert said["estimate"] == "lost"
+
+
+def test_the_report_warns_until_an_estimate_was_heard() -> None:
+    for state, level, message in (
+        (NODE.begin(NOW_NS), 1, "waiting for estimates"),
+        (fed([(NOW_NS, estimate(status=0))])[0], 0, "ok"),
+    ):
+        (status,) = decode_as(NODE.report(state, NOW_NS).payload, msg.DiagnosticArray).status
+        assert (status.level, status.message) == (level, message)
+
+
+def test_a_change_of_sides_is_told_by_where_it_is() -> None:
+    node = ControllerNode(load_scenario("changing-sides"))
+    k_u = load_scenario("changing-sides").leader.k_u
+    left = Event(node.topics.side, encode(msg.String(data="left")))
+    hard, gently = estimate(u1=20.0 * k_u), estimate(u1=0.0)
+    told: list[tuple[str, str]] = []
+    state = node.begin(EPOCH_NS)
+    for event in (gently, left, hard, gently):
+        state, _ = node.step(state, event, NOW_NS)
+        said = reported(state, node)
+        told.append((said["side"], said["side_change"]))
+    waits = ("left", "waits for a leader that turns less")
+    assert told == [("right", "none"), waits, waits, ("left", "under way")]
+
+
+def test_diagnostics_leave_twice_a_second() -> None:
+    state, times = NODE.begin(NOW_NS), []
+    for k in range(101):
+        now_ns = NOW_NS + 20 * k * MS
+        state, out = NODE.step(state, TICK, now_ns)
+        times += [now_ns - NOW_NS for message in out if message.topic == topics.DIAGNOSTICS]
+    assert times == [500 * k * MS for k in range(5)]
+
+
+def test_an_estimate_may_be_50_ms_ahead_of_the_clock_before_it_is_refused() -> None:
+    for ahead_ms, refused in ((50.0, {}), (50.001, {"bad_stamp": 1})):
+        state, _, _ = fed([(NOW_NS, estimate(age_ms=-ahead_ms))])
+        assert dict(state.refused) == refused

@@ -19,12 +19,12 @@ from hil.lockstep.lockstep import EPOCH_NS
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import read_log
 from hil.nodes.estimator import EstimatorNode, EstimatorState
-from hil.nodes.node import Outgoing, digest
+from hil.nodes.node import Outgoing
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import EstimatorName
 from hil.wire import message_types as msg
 from hil.wire import topics
-from hil.wire.events import TICK, Event
+from hil.wire.events import TICK, Event, digest
 from hil.wire.messages import decode_as, encode, header, to_ns
 
 FRAME_NS = 8_333_333
@@ -63,7 +63,7 @@ def drive(count: int, seed: int = 1) -> list[Timed]:
 def fed(
     events: Sequence[Timed], node: EstimatorNode = NODE, state: EstimatorState | None = None
 ) -> tuple[EstimatorState, list[Outgoing]]:
-    state = node.begin(EPOCH_NS) if state is None else state
+    state = node.begin(EPOCH_NS) if state is None else state.copy()
     sent: list[Outgoing] = []
     for now_ns, event in events:
         state, out = node.step(state, event, now_ns)
@@ -77,11 +77,17 @@ def estimates(sent: Sequence[Outgoing]) -> list[msg.LeaderEstimate]:
 
 WARM, _ = fed(drive(60))
 WARM_NS = EPOCH_NS + 60 * FRAME_NS + LATENCY_NS
-WARM_S = 60 * FRAME_NS * 1e-9
-PAIR = [
-    ("leader", advance(Pose(0.3, 0.0, 1.5), 0.08, 0.3, WARM_S)),
-    ("follower", advance(Pose(0.7, 0.1, 1.6), 0.1, 0.2, WARM_S)),
-]
+
+
+def pair_after(passed_ns: int) -> list[tuple[str, Pose]]:
+    passed = passed_ns * 1e-9
+    return [
+        ("leader", advance(Pose(0.3, 0.0, 1.5), 0.08, 0.3, passed)),
+        ("follower", advance(Pose(0.7, 0.1, 1.6), 0.1, 0.2, passed)),
+    ]
+
+
+PAIR = pair_after(60 * FRAME_NS)
 
 
 @pytest.mark.parametrize("kind", ESTIMATORS)
@@ -122,9 +128,9 @@ def test_every_input_is_receipted_once_in_the_order_of_consumption() -> None:
 @settings(deadline=None, max_examples=200)
 def test_no_bytes_on_any_topic_raise_or_move_the_track(topic: str, payload: bytes) -> None:
     for node in (NODE, BODY_NODE):
-        after, out = node.step(WARM, Event(topic, payload), WARM_NS)
+        after, out = node.step(WARM.copy(), Event(topic, payload), WARM_NS)
         assert out == ()
-        assert after.track == WARM.track
+        assert after.memory.track == WARM.memory.track
         assert sum(after.refused.values()) == 1
 
 
@@ -198,7 +204,7 @@ def test_what_is_refused_is_counted_by_its_cause(cause: str, payload: bytes) -> 
     state, sent = fed([(WARM_NS, Event(topics.RIGID_BODIES, payload))] * 100, NODE, WARM)
     assert state.refused == {cause: 100}
     assert estimates(sent) == []
-    assert state.track == WARM.track
+    assert state.memory.track == WARM.memory.track
 
 
 def test_a_stranger_beside_the_pair_is_counted_and_the_pair_is_used() -> None:
@@ -227,7 +233,7 @@ def test_a_leader_sighted_in_the_follower_s_own_place_is_refused(ahead: float, r
         sighting = encode(msg.RangeBearing(header(now_ns, "follower"), rho, 0.0))
         state, _ = node.step(state, Event(node.topics.sighting, sighting), now_ns)
     assert state.refused == {"same_place": 4}
-    assert not state.track
+    assert not state.memory.begun
 
 
 def test_a_sighting_needs_the_body_front_end() -> None:
@@ -239,19 +245,29 @@ def test_a_sighting_needs_the_body_front_end() -> None:
     assert (estimates(sent)[0].rho, estimates(sent)[0].alpha2) == pytest.approx((0.4, 1.5))
 
 
-def test_the_same_step_twice_gives_the_same_bytes_and_leaves_its_state_alone() -> None:
-    count, receipts = len(WARM.track), WARM.receipts
-    beliefs = [point.belief.mean.copy() for point in WARM.track]
-    _, event = frame(60, PAIR)
-    first = NODE.step(WARM, event, WARM_NS)[1]
-    NODE.step(WARM, Event(topics.RIGID_BODIES, b""), WARM_NS)
-    assert NODE.step(WARM, event, WARM_NS)[1] == first
-    assert (len(WARM.track), WARM.receipts, WARM.refused) == (count, receipts, {})
-    assert all(np.array_equal(p.belief.mean, b) for p, b in zip(WARM.track, beliefs, strict=True))
+@pytest.mark.parametrize("kind", ESTIMATORS)
+def test_copies_step_to_the_same_bytes_and_leave_what_they_are_copies_of_alone(kind: str) -> None:
+    node, warm = warmed(kind, "world")
+
+    def known() -> tuple[object, ...]:
+        memory = warm.memory
+        return memory.track, memory.history, memory.known, warm.watch, warm.receipts, warm.taken, warm.refused
+
+    before, since_ns = known(), 57 * FRAME_NS + FRAME_NS // 2
+    new = frame(60, PAIR)[1]
+    late = Event(topics.RIGID_BODIES, encode(frame_message(EPOCH_NS + since_ns, 57, pair_after(since_ns))))
+    told = odometry_message(EPOCH_NS + since_ns, "follower", PAIR[1][1], Motion(0.12, 0.1))
+    odometry, broken = Event(node.topics.odom, encode(told)), Event(topics.RIGID_BODIES, b"")
+    for events in ([new], [late], [odometry, new], [broken, new]):
+        first, again = (fed([(WARM_NS, event) for event in events], node, warm) for _ in range(2))
+        assert first[1]
+        assert first[1] == again[1]
+        assert first[0].memory.track == again[0].memory.track != before[0]
+        assert known() == before
 
 
 def test_while_measurements_are_missing_it_says_so_by_itself() -> None:
-    state, told = WARM, []
+    state, told = WARM.copy(), []
     for _ in range(30):
         now_ns = max(NODE.due_ns(state), WARM_NS)
         state, out = NODE.step(state, TICK, now_ns + 50_000_000)
@@ -301,7 +317,7 @@ def test_over_a_whole_log_the_compiled_filter_is_filterpys(
     compared = 0
     for event in rough_inputs:
         (left, _), (right, _) = (fed([event], node, s) for node, s in zip(nodes, (left, right), strict=True))
-        for found, wanted in zip(left.track[-1:], right.track[-1:], strict=True):
+        for found, wanted in zip(left.memory.track[-1:], right.memory.track[-1:], strict=True):
             assert (found.verdict, found.settled) == (wanted.verdict, wanted.settled)
             sd = np.sqrt(np.diag(wanted.belief.covariance))
             change = found.belief.covariance - wanted.belief.covariance

@@ -23,7 +23,7 @@ from estimation.tracking.track_point import TrackPoint, Verdict
 from estimation.tracking.tracker import TrackSettings
 from formation.kernel import interpreted
 from formation.pose import Pose, advance
-from formation.records import Rows, columns_of, load, row_of, rows_of, store
+from formation.records import Rows, columns_of, load, row_of, rows_of
 from formation.ring import EMPTY, Ring
 from hil.nodes import estimator_entries as entries
 from hil.nodes.estimator_entries import Shown
@@ -160,7 +160,9 @@ def rough_drive(seed: int, sightings: bool) -> list[Sent]:
         seen = pair.seen()
         if freezing > 0:
             freezing -= 1
-            seen = frozen if freezing > 4 else seen._replace(leader_x=frozen.leader_x, leader_y=frozen.leader_y)
+            seen = (
+                frozen if freezing > 4 else seen._replace(leader_x=frozen.leader_x, leader_y=frozen.leader_y)
+            )
         elif k in (200, 450):
             frozen, freezing = seen, 12
         own = seen.follower
@@ -243,7 +245,9 @@ FOLDED = [
     # Differences with odometry take it as it comes: that is what they are there to show.
     if kind is not Kind.DIFFERENCE or source == MOCAP
 ]
-FOLDED_IDS = [f"{kind.name.lower()}-{front_end.value}-{SOURCES[source]}" for kind, front_end, source in FOLDED]
+FOLDED_IDS = [
+    f"{kind.name.lower()}-{front_end.value}-{SOURCES[source]}" for kind, front_end, source in FOLDED
+]
 
 
 @pytest.mark.parametrize(("frames", "odometry"), [(True, False), (False, True), (True, True)])

@@ -90,18 +90,23 @@ def test_late_frames_give_what_delivery_in_order_would_have_given(front_end: str
     assert mixed.taken["late"] > 5
     assert not mixed.refused
     assert (found[-1].v2, found[-1].u2) == pytest.approx((expected[-1].v2, expected[-1].u2), abs=1e-12)
-    for one, other in zip(mixed.track[-12:], in_order.track[-12:], strict=True):
+    for one, other in zip(mixed.memory.track[-12:], in_order.memory.track[-12:], strict=True):
         np.testing.assert_allclose(one.belief.mean, other.belief.mean, atol=1e-9)
         np.testing.assert_allclose(one.belief.covariance, other.belief.covariance, atol=1e-9)
 
 
 def test_frames_that_come_twice_or_too_late_leave_the_own_track_alone() -> None:
-    node, events = node_with("mocap"), frames(120)
+    node, (*events, new) = node_with("mocap"), frames(121)
+    now_ns = EPOCH_NS + 10 * 1_000_000_000
     state, _ = fed(node, events)
+    expected, _ = node.step(state.copy(), new, now_ns)
     for again in (events[-1], events[50]):
-        after, out = node.step(state, again, EPOCH_NS + 10 * 1_000_000_000)
-        assert after.own.track is state.own.track
+        after, out = node.step(state.copy(), again, now_ns)
         assert out == ()
+        assert after.memory.track == state.memory.track
+        after, out = node.step(after, new, now_ns)
+        assert len(out) == 1
+        assert after.memory.track == expected.memory.track
 
 
 def test_without_odometry_it_does_not_wait_for_any() -> None:
@@ -110,7 +115,7 @@ def test_without_odometry_it_does_not_wait_for_any() -> None:
     now_ns = EPOCH_NS + 60 * FRAME_NS
     report = decode_as(node.report(state, now_ns).payload, msg.DiagnosticArray).status[0]
     assert (report.level, report.message) == (0, "ok")
-    assert node.tracker.status(state.track, now_ns) is Status.TRACKING
+    assert state.memory.status(now_ns) is Status.TRACKING
 
 
 @pytest.mark.parametrize(("source", "length"), [("mocap", 1), ("mocap", 40), ("fused", 40)])

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hil.log.events import Recorded
-from hil.nodes.node import Outgoing, digest
+from hil.nodes.node import Outgoing
 from hil.replay.journal import Journey, feed, index_by_digest, parity_of, refeed
 from hil.wire.events import Event
 
@@ -42,7 +42,7 @@ class TallyNode:
         if not event.topic:
             state = replace(state, next_tick_ns=now_ns + PERIOD_NS)
             return self._publish(state, now_ns) if state.total % 2 else (state, ())
-        receipt = (digest(event.topic, event.payload), now_ns)
+        receipt = (event.digest, now_ns)
         state = replace(state, receipts=(*state.receipts, receipt), total=state.total + event.payload[0])
         return (state, ()) if event.payload[0] % 3 == 0 else self._publish(state, now_ns)
 
@@ -64,8 +64,8 @@ def recorded(journey: Journey[TallyState]) -> list[Recorded]:
     return outputs
 
 
-def logged_drive(journey: Journey[TallyState]) -> list[int]:
-    return [digest(each.topic, each.payload) for each in journey.outputs if each.topic == "drive"]
+def logged_drive(journey: Journey[TallyState]) -> list[bytes]:
+    return [each.payload for each in journey.outputs if each.topic == "drive"]
 
 
 lives = st.lists(st.tuples(st.integers(0, 255), st.integers(0, 120)), min_size=1, max_size=40)
@@ -141,7 +141,7 @@ def test_a_flipped_bit_in_an_output_is_found_there_and_only_there(
 
 
 ROUTE = [(2, 0), (4, 1), (10, 1), (0, 1), (8, 1)]
-OTHERS = digest("drive", b"other")
+OTHERS = b"other"
 
 
 @pytest.mark.parametrize(
@@ -158,7 +158,7 @@ OTHERS = digest("drive", b"other")
     ids=["same", "changed", "two changed", "missed", "cut", "sent by others", "not recorded"],
 )
 def test_beside_the_output_a_changed_message_differs_and_a_missed_one_cannot_be_compared(
-    change: Callable[[list[int]], list[int]], expected: tuple[int, int | None, int]
+    change: Callable[[list[bytes]], list[bytes]], expected: tuple[int, int | None, int]
 ) -> None:
     events, journey = live(ROUTE)
     sent = logged_drive(journey)

@@ -178,3 +178,101 @@ def test_bytes_of_any_kind_are_read_or_refused_and_nothing_else(payload: bytes) 
     ):
         with contextlib.suppress(RefusedError):
             read()
+
+
+orientations = st.tuples(angles, st.floats(-1.5, 1.5), angles)
+
+
+@given(orientations, st.floats(0.9901, 1.0099))
+@settings(deadline=None)
+def test_a_body_is_tilted_when_its_axis_leans_by_more_than_30_degrees_to_any_side(
+    turned: tuple[float, float, float], length: float
+) -> None:
+    rotation = Rotation.from_euler("ZYX", turned)
+    x, y, z, w = (length * rotation.as_quat()).tolist()
+    upright = float(rotation.apply([0.0, 0.0, 1.0])[2])
+    payload = frame(body("leader"), body("follower", qx=x, qy=y, qz=z, qw=w))
+    if upright < math.cos(math.radians(30.0)) - 1e-9:
+        assert cause_of(payload) == "tilted"
+    elif upright > math.cos(math.radians(30.0)) + 1e-9:
+        forward = rotation.apply([1.0, 0.0, 0.0])
+        found = read_frame(payload, "leader", "follower", NOW_NS).follower
+        assert abs(wrap(found.theta - math.atan2(forward[1], forward[0]))) < 1e-9
+
+
+@pytest.mark.parametrize("axis", ["qx", "qy"])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_body_on_its_side_is_tilted_whichever_side_it_is(axis: str, sign: float) -> None:
+    for degrees, fits in ((29.0, True), (31.0, False), (90.0, False), (180.0, False)):
+        half = math.radians(0.5 * degrees)
+        payload = frame(
+            body("leader"), body("follower", **{axis: sign * math.sin(half), "qw": math.cos(half)})
+        )
+        if fits:
+            assert read_frame(payload, "leader", "follower", NOW_NS).follower.theta == 0.0
+        else:
+            assert cause_of(payload) == "tilted"
+
+
+@pytest.mark.parametrize("part", ["qx", "qy", "qz", "qw"])
+@pytest.mark.parametrize(
+    ("length", "fits"), [(0.9899, False), (0.9901, True), (1.0099, True), (1.0101, False)]
+)
+def test_a_quaternion_may_be_off_a_unit_by_a_hundredth(part: str, length: float, fits: bool) -> None:
+    payload = frame(body("leader"), body("follower", **{"qw": 0.0, part: length}))
+    if fits and part in ("qz", "qw"):
+        theta = read_frame(payload, "leader", "follower", NOW_NS).follower.theta
+        assert theta == pytest.approx(math.pi if part == "qz" else 0.0, abs=1e-12)
+    else:
+        assert cause_of(payload) == ("tilted" if fits else "bad_quaternion")
+
+
+@pytest.mark.parametrize("part", ["x", "y", "z"])
+@pytest.mark.parametrize("name", ["leader", "follower"])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_ten_kilometres_are_the_farthest(part: str, name: str, sign: float) -> None:
+    other = "follower" if name == "leader" else "leader"
+    read_frame(frame(body(other), body(name, **{part: sign * 1e4})), "leader", "follower", NOW_NS)
+    assert cause_of(frame(body(other), body(name, **{part: sign * 1.0001e4}))) == "out_of_range"
+    assert cause_of(frame(body(other), body(name, **{part: sign * math.inf}))) == "not_finite"
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_thousand_is_the_fastest_and_ten_kilometres_the_longest_range(sign: float) -> None:
+    for v, u in ((1.0, 0.0), (0.0, 1.0)):
+        read_odometry(odometry(sign * 1e3 * v, sign * 1e3 * u), NOW_NS)
+        with pytest.raises(RefusedError, match=r"^out_of_range$"):
+            read_odometry(odometry(sign * 1001.0 * v, sign * 1001.0 * u), NOW_NS)
+    assert read_sighting(sighting(1e4, sign * 1e4), NOW_NS).rho == 1e4
+    assert read_sighting(sighting(1e-9, 0.0), NOW_NS).rho == 1e-9
+    for rho, alpha2 in ((1.001e4, 0.0), (1.0, sign * 1.001e4)):
+        with pytest.raises(RefusedError, match=r"^out_of_range$"):
+            read_sighting(sighting(rho, alpha2), NOW_NS)
+
+
+@pytest.mark.parametrize("read", [read_odometry, read_sighting])
+def test_a_stamp_may_be_50_ms_ahead_and_no_more(read: Callable[[bytes, int], object]) -> None:
+    for ahead_ns, fits in ((50_000_000, True), (50_000_001, False)):
+        stamp_ns = NOW_NS + ahead_ns
+        payload = odometry(0.1, 0.1, stamp_ns) if read is read_odometry else sighting(1.0, 1.0, stamp_ns)
+        if fits:
+            read(payload, NOW_NS)
+        else:
+            with pytest.raises(RefusedError, match=r"^bad_stamp$"):
+                read(payload, NOW_NS)
+
+
+def test_who_has_no_clock_takes_stamps_of_the_future() -> None:
+    ahead = frame(body("leader"), body("follower"), stamp_ns=NOW_NS + 10**12)
+    assert read_frame(ahead, "leader", "follower").capture_ns == NOW_NS + 10**12
+
+
+def test_only_bodies_that_nobody_knows_are_strangers() -> None:
+    pair = [body("leader"), body("follower")]
+    payload = frame(body("cat"), *pair, body("dog"), body("ball"), body("dog"))
+    assert read_frame(payload, "leader", "follower", NOW_NS).strangers == 4
+    assert read_frame(payload, "leader", "follower", NOW_NS, others=("dog", "owl")).strangers == 2
+    with pytest.raises(RefusedError, match=r"^missing_leader$"):
+        read_frame(frame(body("dog")), "leader", "follower", NOW_NS, others=("dog",))
+    with pytest.raises(RefusedError, match=r"^unknown_body$"):
+        read_frame(frame(body("cat")), "leader", "follower", NOW_NS, others=("dog",))

@@ -1,14 +1,11 @@
 from __future__ import annotations
 
 import pytest
-from hil.nodes.leader_filter import leader_filter
 
 from formation.pose import Motion, Pose, advance
 from formation.shape import shape_of
 from hil.emulator.lab_messages import odometry_message
-from hil.errors import UsageError
 from hil.nodes.estimator import EstimatorNode
-from hil.replay.smoothing import ListeningEstimator
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
 from hil.wire.events import Event
@@ -37,8 +34,9 @@ def reported(settings: list[str], u2: float, seconds: float = 20.0) -> tuple[dic
             state, _ = node.step(state, Event(topic, encode(message)), now_ns)
         leader, follower = advance(leader, 0.15, 0.0, 0.05), advance(follower, own.v, own.u, 0.05)
     report = decode_as(node.report(state, now_ns).payload, msg.DiagnosticArray).status[0]
-    found = node.estimate(state, now_ns)
-    assert found is not None
+    told_last = state.memory.estimate(now_ns)
+    assert told_last is not None
+    found = told_last.estimate
     return (
         {each.key: each.value for each in report.values},
         found.rho - shape.rho,
@@ -67,17 +65,3 @@ def test_offsets_are_left_alone_where_both_drive_straight_on_and_the_report_says
     assert said["bearing_bias_state"] == "off: the follower's velocity does not change against the leader's"
     assert float(said["range_bias_sd"]) == pytest.approx(0.05, rel=0.1)
     assert float(said["bearing_bias_sd"]) == pytest.approx(0.1, rel=0.1)
-
-
-@pytest.mark.parametrize(
-    ("settings", "kind"), [(["estimator.kind=ukf", *BODY], "'ukf' on the body"), ([], "'ekf' on the world")]
-)
-def test_filters_without_such_states_are_refused(settings: list[str], kind: str) -> None:
-    with pytest.raises(UsageError, match=f"estimator.bias_states: kind {kind} front end has none"):
-        leader_filter(load_scenario("turtlebot3", ["estimator.bias_states=true", *settings]))
-
-
-def test_the_smoother_has_no_such_states() -> None:
-    settings = ["estimator.kind=smoother", "estimator.bias_states=true", *BODY]
-    with pytest.raises(UsageError, match="kind 'smoother' on the body front end has none"):
-        ListeningEstimator(load_scenario("turtlebot3", settings))

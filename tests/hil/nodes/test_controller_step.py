@@ -1,0 +1,130 @@
+"""The controller's step in numbers: compiled and interpreted, event by event."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controllers.follower import Command
+from controllers.guard import CLOCK_TOLERANCE_NS, StopReason
+from controllers.station_keeper import at_station
+from estimation.tracking.prediction import Reported, SentCommand
+from estimation.tracking.tracker import Status
+from formation.kernel import interpreted
+from formation.records import Rows, columns_of, load, row_of, rows_of
+from formation.station import Side
+from hil.nodes.control_rules import control_rules
+from hil.nodes.controller_entries import NO_REPORT, ControlEvent, Happening, Outcome, control
+from hil.nodes.controller_step import ControlState, begun
+from hil.scenario.files import load_scenario
+from hil.scenario.parts import station
+
+MS = 1_000_000
+NOW_NS = 1_000_000 * MS
+LAWS = ("independent", "ideal", "feedforward", "faded")
+
+
+class Controller:
+    """A controller's rows, and a step of it by one function."""
+
+    def __init__(self, law: str, step: object = control, scenario: str = "turtlebot3") -> None:
+        chosen = load_scenario(scenario, [f"controller.law={law}"])
+        self.rules = row_of(control_rules(chosen))
+        self.states = row_of(begun(at_station(station(chosen)), NOW_NS))
+        self.commands: Rows[SentCommand] = rows_of(SentCommand, 64)
+        self.result: Rows[Command] = rows_of(Command, 1)
+        self.step = step
+
+    def take(self, event: ControlEvent, now_ns: int) -> int:
+        outcome: int = self.step(  # type: ignore[operator]
+            self.states, self.rules, self.commands, row_of(event), self.result, now_ns
+        )
+        return outcome
+
+    @property
+    def command(self) -> Command:
+        return load(Command, self.result, 0)
+
+
+def reported(capture_ns: int, **changes: float) -> Reported:
+    sound = Reported(capture_ns, capture_ns, 0.25, 1.5, 0.08, -1.5, 0.3, 0.01, 0.1, 0.3)
+    return sound._replace(**changes)  # type: ignore[arg-type]
+
+
+def estimate(capture_ns: int, status: int = Status.TRACKING.value, **changes: float) -> ControlEvent:
+    return ControlEvent(Happening.ESTIMATE.value, status, 0.0, reported(capture_ns, **changes))
+
+
+def plain(kind: Happening, number: float = 0.0) -> ControlEvent:
+    return ControlEvent(kind.value, 0, number, NO_REPORT)
+
+
+QUANTITIES = ("rho", "alpha2", "v1", "alpha1", "u1", "var_u1", "v2")
+OTHERS = [each for each in Happening if each is not Happening.ESTIMATE]
+numbers = st.one_of(st.floats(), st.floats(-2.0, 2.0))
+estimates = st.builds(
+    lambda age_ms, status, changes: (age_ms, status, changes),
+    st.integers(-60, 250),
+    st.sampled_from(Status),
+    st.dictionaries(st.sampled_from(QUANTITIES), numbers, max_size=1),
+)
+others = st.builds(plain, st.sampled_from(OTHERS), st.just(-1.0))
+
+
+@pytest.mark.parametrize("law", LAWS)
+@given(steps=st.lists(st.tuples(st.integers(-5, 30), st.one_of(estimates, others)), max_size=25))
+def test_compiled_and_interpreted_are_the_same(
+    law: str, steps: list[tuple[int, ControlEvent | tuple[int, Status, dict[str, float]]]]
+) -> None:
+    one, other = (Controller(law, step, "changing-sides") for step in (control, interpreted(control)))
+    now_ns = NOW_NS
+    for after_ms, drawn in steps:
+        now_ns += after_ms * MS
+        if isinstance(drawn, ControlEvent):
+            event = drawn
+        else:
+            age_ms, status, changes = drawn
+            event = estimate(now_ns - age_ms * MS, status.value, **changes)
+        assert one.take(event, now_ns) == other.take(event, now_ns)
+        assert nan_free(one) == nan_free(other)
+
+
+def nan_free(controller: Controller) -> str:
+    """All rows in words: NaN has several forms in bytes."""
+    state = load(ControlState, controller.states, 0)
+    return repr((state, controller.command, columns_of(controller.commands).tolist()))
+
+
+@pytest.mark.parametrize("ahead_ns", [0, 40 * MS, CLOCK_TOLERANCE_NS])
+def test_an_estimate_whose_stamps_are_accepted_may_move_the_robot(ahead_ns: int) -> None:
+    """Stamps that message checks let pass, of a clock that is ahead, do not stop every command."""
+    controller = Controller("independent")
+    assert controller.take(estimate(NOW_NS + ahead_ns), NOW_NS) == Outcome.COMMAND
+    assert controller.command.stop is None
+
+
+def test_a_clock_that_is_further_ahead_is_refused_by_name() -> None:
+    controller = Controller("independent")
+    assert controller.take(estimate(NOW_NS + CLOCK_TOLERANCE_NS + 1), NOW_NS) == Outcome.BAD_STAMP
+    assert controller.take(plain(Happening.TICK), NOW_NS) == Outcome.COMMAND
+    assert controller.command.stop is StopReason.NO_ESTIMATE
+
+
+def test_orders_and_the_leaders_turn_rate_move_nobody() -> None:
+    controller = Controller("ideal")
+    assert controller.take(plain(Happening.LEADER, 0.4), NOW_NS) == Outcome.NO_COMMAND
+    assert load(ControlState, controller.states, 0).leader_u1 == 0.4
+    assert controller.take(plain(Happening.ORDER, Side.RIGHT.sign), NOW_NS) == Outcome.NO_COMMAND
+    assert controller.take(plain(Happening.ORDER, Side.LEFT.sign), NOW_NS) == Outcome.UNSAFE_ORDER
+
+
+def test_a_clock_that_is_set_back_ends_what_is_known() -> None:
+    controller = Controller("faded")
+    controller.take(estimate(NOW_NS - MS), NOW_NS)
+    controller.take(plain(Happening.NOTHING), NOW_NS - 10 * MS)
+    state = load(ControlState, controller.states, 0)
+    assert (state.known, state.trend.known, state.sent.length) == (False, False, 0)
+    assert math.isnan(state.leader_u1)
