@@ -29,19 +29,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from controllers.laws import independent
 from controllers.limits import Limits
-<<<<<<< HEAD
-from estimation.models.measurement import FrontEnd, measure_body_from_mocap, measure_world
-from estimation.own_motion.odometry_history import History, MotionSample, follower_motion, remember
-from estimation.tracking.estimate import Estimate, estimate_at
-from estimation.tracking.follower_check import NO_DOUBT
-from estimation.tracking.track import Track
-from estimation.tracking.track_point import Verdict
-=======
 from estimation.models.measurement import FrontEnd, PairSeen
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.tracking.estimate import Estimate
 from estimation.tracking.track_point import GATED
->>>>>>> 37f864f42b09603862c9d401dd9b6e321386fb79
 from estimation.tracking.tracker import Status
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -318,10 +317,10 @@ def test_an_estimator_that_knows_nothing_of_the_turn_rate_is_predicted_as_it_is(
 def test_robots_predicted_onto_one_point_keep_the_shape_that_was_seen() -> None:
     """In a thirty-second of a second a follower at 8 m/s reaches a leader that stands 0.25 m ahead."""
     until_ns = NOW_NS + 31_250_000
-    standing = replace(estimate(v2=8.0, u2=0.0, alpha2=0.0), rho=0.25, v1=0.0, u1=0.0, alpha1=-2.0)
+    standing = estimate(v2=8.0, u2=0.0, alpha2=0.0)._replace(rho=0.25, v1=0.0, u1=0.0, alpha1=-2.0)
     assert predict_shape(standing, [], until_ns, 0.0) == Shape(0.25, -2.0, 0.0)
     # One coordinate in common is no meeting.
-    assert_close(predict_shape(replace(standing, v2=4.0), [], until_ns, 0.0), Shape(0.125, -2.0, 0.0), 1e-12)
-    beside = replace(standing, alpha2=1.0, v2=32.0 * 0.25 * math.cos(1.0))
+    assert_close(predict_shape(standing._replace(v2=4.0), [], until_ns, 0.0), Shape(0.125, -2.0, 0.0), 1e-12)
+    beside = standing._replace(alpha2=1.0, v2=32.0 * 0.25 * math.cos(1.0))
     expected = Shape(0.25 * math.sin(1.0), -2.0 - 1.0 + 0.5 * math.pi, 0.5 * math.pi)
     assert_close(predict_shape(beside, [], until_ns, 0.0), expected, 1e-12)

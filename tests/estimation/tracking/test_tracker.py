@@ -20,6 +20,7 @@ from estimation.models.measurement import (
     measure_world,
 )
 from estimation.tracking.estimate import Estimate, estimate_at
+from estimation.tracking.follower_check import Cause
 from estimation.tracking.track import Track, Tracker
 from estimation.tracking.track_point import Verdict
 from estimation.tracking.tracker import Status, TrackSettings
@@ -372,10 +373,10 @@ def test_a_follower_may_be_off_by_what_its_noise_and_motion_leave_in_any_directi
     reach = math.sqrt(gate * (2.0 * NOISE.position**2 + sd_position**2))
     turn = math.sqrt(gate * (2.0 * NOISE.heading**2 + sd_heading**2))
     for share, expected in ((0.99, Cause.NONE), (1.01, Cause.FOLLOWER)):
-        aside = replace(
-            here, x=here.x + share * reach * math.cos(angle), y=here.y + share * reach * math.sin(angle)
+        aside = here._replace(
+            x=here.x + share * reach * math.cos(angle), y=here.y + share * reach * math.sin(angle)
         )
-        for pose in (aside, replace(here, theta=here.theta + math.copysign(share * turn, angle))):
+        for pose in (aside, here._replace(theta=here.theta + math.copysign(share * turn, angle))):
             at_ns = EPOCH_NS + (119 + gap) * FRAME_NS
             after, verdict = of.add(track, measure_world(at_ns, (leader.x, leader.y), pose, NOISE, measured))
             assert after[-1].cause == expected
