@@ -22,9 +22,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from formation.angles import FloatArray
 from hil.errors import CheckFailedError
+from hil.lockstep.flyer import Flyer
 from hil.scenario.files import load_scenario
-from hil.sweep.engine import Engine
-from hil.sweep.engine_rules import evaluation_ns
+from hil.sweep.tally import judged_span, true_states
 
 LAWS = ("independent", "feedforward", "faded")
 POSITIONS_MM = (0.3, 1.0, 2.0, 5.0, 10.0, 20.0)
@@ -48,17 +48,14 @@ def distances_mm(cell: Cell, seeds: int) -> dict[str, float]:
 def distance_mm(overrides: Sequence[str], seeds: int) -> float:
     """RMS distance from rho_0 [mm] over runs of ``turtlebot3`` with changes; nan if one broke down."""
     scenario = load_scenario("turtlebot3", overrides)
-    engine, (from_ns, to_ns) = Engine(scenario), evaluation_ns(scenario)
+    flyer, span = Flyer(scenario, after_s=0.0), judged_span(scenario)
     squares: list[FloatArray] = []
     for seed in range(seeds):
         try:
-            flight = engine.fly(seed + 1)
+            flown = flyer.fly(seed + 1)
         except CheckFailedError:
             return math.nan
-        since = flight.frames["at_ns"] - flight.since_ns
-        frames = flight.frames[(since >= from_ns) & (since <= to_ns)]
-        x, y = (frames[f"true_f{axis}"] - frames[f"true_l{axis}"] for axis in "xy")
-        squares.append((np.hypot(x, y) - scenario.formation.rho_0) ** 2)
+        squares.append((true_states(flown, 0, span).rho - scenario.formation.rho_0) ** 2)
     return 1e3 * math.sqrt(float(np.mean(np.concatenate(squares))))
 
 

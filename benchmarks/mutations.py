@@ -9,6 +9,7 @@ import ast
 from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import dataclass
+from typing import Any, cast
 
 _COMPARISONS: dict[type[ast.cmpop], tuple[type[ast.cmpop], ...]] = {
     ast.Lt: (ast.LtE, ast.GtE),
@@ -112,7 +113,7 @@ def _of_expression(node: ast.expr) -> Iterator[tuple[str, ast.expr]]:
     elif isinstance(node, ast.IfExp):
         yield "branches", ast.IfExp(node.test, node.orelse, node.body)
     elif isinstance(node, ast.Constant):
-        yield from (("constant", ast.Constant(value)) for value in _other_values(node.value))
+        yield from (("constant", ast.Constant(cast("Any", value))) for value in _other_values(node.value))
     elif isinstance(node, ast.Call):
         yield from _of_call(node)
 

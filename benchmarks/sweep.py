@@ -27,6 +27,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from estimation.own_motion.inputs import MotionSample
 
 from hil.emulator import node as emulator
+from hil.lockstep.flyer import Flyer
 from hil.lockstep.lockstep import EPOCH_NS, Lockstep
 from hil.lockstep.run import START_TIMEOUT_NS, make_nodes
 from hil.nodes import controller, estimator
@@ -34,7 +35,6 @@ from hil.nodes import node as nodes
 from hil.nodes.node import Outgoing
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
-from hil.sweep.engine import Engine
 from hil.sweep.tally import judge_run, orbit_of
 from hil.wire import drive_message
 from hil.wire import message_types as msg
@@ -116,20 +116,20 @@ def main() -> None:
     options = [f"run.duration_s={given.duration}", f"run.seed={SEED}"]
     peer = load_scenario("turtlebot3", [*options, "estimator.kind=ekf-filterpy"])
     ours = load_scenario("turtlebot3", [*options, "estimator.kind=ekf"])
-    engine = Engine(ours)
-    flown = engine.fly(SEED).sent
+    flyer = Flyer(ours, after_s=0.0)
+    flown = flyer.fly(SEED).commands["command"]
     commands = np.array(fly_in_python(peer))
     gap = np.abs(commands - np.column_stack([flown["v"], flown["u"]])[: len(commands)])
     print(f"the same loop: commands differ by at most {gap.max():.1e}")
     orbit = orbit_of(ours)
 
     def judged() -> None:
-        judge_run(engine, engine.fly(SEED), None, orbit)
+        judge_run(ours, flyer.fly(SEED), None, orbit)
 
     took = []
     for _ in range(given.rounds):
         python = seconds(lambda: fly_in_python(peer))
-        compiled = np.median([seconds(lambda: engine.fly(SEED)) for _ in range(50)])
+        compiled = np.median([seconds(lambda: flyer.fly(SEED)) for _ in range(50)])
         took.append((python, compiled, np.median([seconds(judged) for _ in range(20)])))
     speeds = given.duration / np.array(took)
     python, compiled, with_judge = np.median(speeds, axis=0)

@@ -24,7 +24,7 @@ SLOWEST = (
     "tests/hil/test_command_line.py",
     "tests/hil/reports/test_run_report.py",
     "tests/estimation/filters/test_kalman.py",
-    "tests/hil/sweep/test_engine.py",
+    "tests/hil/lockstep/test_flyer.py",
     "tests/hil/lockstep/test_chain_run.py",
 )
 """Files whose tests take longest, the longest first: begun last, one would keep a worker busy alone."""

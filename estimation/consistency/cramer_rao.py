@@ -3,7 +3,8 @@
 Coordinated turn with additive Gaussian process noise, observed through the leader's position in the mocap
 frame. The information obeys the recursion of Tichavsky, Muravchik and Nehorai (IEEE Trans. Signal Processing
 46(5), 1998), which for additive noise reads J' = (Q + F J^-1 F^T)^-1 + H^T R^-1 H with F and Q at the true
-state. It is kept here as P = J^-1, which needs neither J nor Q to be inverted.
+state. It is kept here as P = J^-1, which needs neither J nor Q to be inverted: these are the very steps of
+the EKF, taken at the truth.
 
 It bounds estimators that believe in the same process noise. A leader calmer than its noise (one that drives a
 smooth program, say) can be estimated better than this on average, so that RMSE / bound may fall below 1.
@@ -13,19 +14,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.filters.belief import Model
-from estimation.filters.gaussian import Gaussian
-from estimation.models.coordinated_turn import FollowerMotion
-from estimation.models.measurement import FrontEnd, Measurement, PoseNoise, measure_world
+from estimation.filters.ekf import extended_moved, informed
+from estimation.filters.gaussian import Gaussian, started
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, Spread, State
+from estimation.models.measurement import FrontEnd, PoseNoise, measure_world
 from estimation.models.motion import STATE_SIZE, Matrix, Vector
 from estimation.tracking.estimate import QUANTITIES, estimate_of
-from estimation.tracking.track_point import NO_JUMP
-from estimation.tracking.tracker import Status
+from estimation.tracking.track_point import JumpUncertainty
+from formation.kernel import kernel
 from formation.pose import Pose
+from formation.records import Rows, columns_of, load, rows_of, size, store
 
 _NS = 1e-9
 
@@ -58,33 +62,98 @@ class TruePath:
             raise ValueError("capture_ns runs backwards, expected times that do not decrease")
 
 
+class Moment(NamedTuple):
+    """The truth at one capture; ``wanted``: whether the bound is to be mapped to the quantities here."""
+
+    capture_ns: int
+    leader: State
+    follower: Pose
+    v2: float
+    u2: float
+    measured: bool
+    wanted: bool
+
+
+class Terms(NamedTuple):
+    """What a bound rests on: the leader's limits and noise, that of poses, of v2 [m/s] and u2 [rad/s]."""
+
+    limits: LeaderLimits
+    noise: ProcessNoise
+    pose: PoseNoise
+    sd_v2: float
+    sd_u2: float
+
+
+class Least(NamedTuple):
+    """Bound after one capture: of the state, and the least variances of the quantities where wanted."""
+
+    known: bool
+    state: Gaussian
+    rho_dot: float
+    alpha2_dot: float
+    v1: float
+    alpha1: float
+    u1: float
+
+
+@kernel(inline=False)
+def carry(moments: Rows[Moment], terms: Terms, bounds: Rows[Least]) -> None:
+    """Fill the bound after every moment.
+
+    It starts as the filters do, at the first measurement with what the limits say in advance; before it there
+    is none.
+    """
+    variance = terms.pose.position * terms.pose.position
+    spread, known = Spread(variance, 0.0, variance), False
+    belief = started(0.0, 0.0, spread, terms.limits)
+    before = load(Moment, moments, 0)
+    for k in range(size(moments)):
+        moment = load(Moment, moments, k)
+        if known:
+            dt = (moment.capture_ns - before.capture_ns) * _NS
+            belief = extended_moved(_at(belief, before.leader), dt, terms.noise)
+            if moment.measured:
+                belief = informed(belief, belief.x, belief.y, spread)
+        elif moment.measured:
+            known = True
+            belief = started(moment.leader.x, moment.leader.y, spread, terms.limits)
+        belief = _at(belief, moment.leader)
+        least = Least(known, belief, math.inf, math.inf, math.inf, math.inf, math.inf)
+        if known and moment.wanted:
+            least = _mapped(belief, moment, terms)
+        store(bounds, k, least)
+        before = moment
+
+
+@kernel
+def _at(belief: Gaussian, state: State) -> Gaussian:
+    """The same covariance about another state."""
+    return belief._replace(x=state.x, y=state.y, vx=state.vx, vy=state.vy, u=state.u)
+
+
+@kernel
+def _mapped(belief: Gaussian, moment: Moment, terms: Terms) -> Least:
+    """Bound mapped to the quantities, to first order."""
+    motion = FollowerMotion(moment.v2, moment.u2, terms.sd_v2, terms.sd_u2)
+    leader = (moment.leader.x, moment.leader.y)
+    here = measure_world(moment.capture_ns, leader, moment.follower, terms.pose, motion)
+    jump = JumpUncertainty(0.0, 0.0, 0)
+    joint = estimate_of(belief, here, 0, math.nan, moment.capture_ns, jump).joint
+    return Least(True, belief, joint.r_r, joint.a_a, joint.v_v, joint.b_b, joint.u_u)
+
+
 def state_bound(path: TruePath, model: Model, sigma_position: float) -> NDArray[np.float64]:
     """Bound (n, 5, 5) of the covariance of the leader's state after each capture time.
 
-    Each measurement has covariance sigma_position^2 I [m^2]. The recursion starts as the filters do, at the
-    first measurement with what ``model`` knows in advance; before it there is no bound (NaN). Raises
-    :class:`ValueError` for a model of another front end than the world's.
+    Each measurement has covariance sigma_position^2 I [m^2]; before the first there is no bound (NaN).
+    Raises :class:`ValueError` for a model of another front end than the world's.
     """
-    if model.front_end is not FrontEnd.WORLD:
-        raise ValueError(f"front end is {model.front_end.value!r}, expected 'world'")
-    still = FollowerMotion(0.0, 0.0, 0.0, 0.0)
-    noise = sigma_position**2 * np.eye(2)
-    bounds = np.full((len(path.capture_ns), STATE_SIZE, STATE_SIZE), math.nan)
-    covariance: Matrix | None = None
-    for k, (now_ns, mean, measured) in enumerate(
-        zip(path.capture_ns, path.leader, path.measured, strict=True)
-    ):
-        if covariance is not None:
-            dt = float(now_ns - path.capture_ns[k - 1]) * _NS
-            before = path.leader[k - 1]
-            move = model.transition(before, dt, still)
-            covariance = move @ covariance @ move.T + model.process_noise(before, dt, still)
-            if measured:
-                covariance = _informed(covariance, noise)
-        elif measured:
-            covariance = model.start(Measurement.at(int(now_ns), mean[0:2], noise, still)).covariance
-        if covariance is not None:
-            bounds[k] = covariance
+    wanted = np.zeros(len(path.capture_ns), dtype=np.bool_)
+    found = _bounds(path, model, PoseNoise(sigma_position, 0.0), (0.0, 0.0), wanted)
+    bounds = np.full((len(wanted), STATE_SIZE, STATE_SIZE), math.nan)
+    rows = columns_of(found)
+    for k in np.flatnonzero(rows["known"]):
+        bounds[k] = load(Least, found, int(k)).state.covariance
     return bounds
 
 
@@ -105,25 +174,34 @@ def cramer_rao(
     average the squares. Infinite before the first measurement, and in rows that are not ``wanted`` (None: all
     are), for which the mapping is left out.
     """
-    states = state_bound(path, model, pose_noise.position)
-    deviations = np.full((len(states), len(QUANTITIES)), math.inf)
-    known = np.isfinite(states[:, 0, 0])
-    for k in np.flatnonzero(known if wanted is None else known & wanted):
-        mean = path.leader[k]
-        v2, u2 = path.follower_motion[k].tolist()
-        motion, pose = FollowerMotion(v2, u2, sd_v2, sd_u2), Pose(*path.follower_pose[k].tolist())
-        x, y = mean[0:2].tolist()
-        here = measure_world(int(path.capture_ns[k]), (x, y), pose, pose_noise, motion)
-        belief = Gaussian.of(mean, states[k])
-        mapped = estimate_of(belief, here, Status.TRACKING, math.nan, here.capture_ns, NO_JUMP)
-        deviations[k] = np.sqrt(np.diag(mapped.covariance))
-    return {name: deviations[:, column] for column, name in enumerate(QUANTITIES)}
+    asked = np.ones(len(path.capture_ns), dtype=np.bool_) if wanted is None else wanted
+    rows = columns_of(_bounds(path, model, pose_noise, (sd_v2, sd_u2), asked))
+    return {name: np.sqrt(rows[name]) for name in QUANTITIES}
 
 
-def _informed(covariance: Matrix, noise: Matrix) -> Matrix:
-    """(P^-1 + H^T R^-1 H)^-1 for H that picks the position, by the Joseph form."""
-    gain = covariance[:, 0:2] @ np.linalg.inv(covariance[0:2, 0:2] + noise)
-    rest = np.eye(STATE_SIZE)
-    rest[:, 0:2] -= gain
-    updated: Matrix = rest @ covariance @ rest.T + gain @ noise @ gain.T
-    return updated
+def _bounds(
+    path: TruePath,
+    model: Model,
+    pose_noise: PoseNoise,
+    sd_motion: tuple[float, float],
+    wanted: NDArray[np.bool_],
+) -> Rows[Least]:
+    from estimation.consistency.entries import carry_bounds
+
+    if model.front_end is not FrontEnd.WORLD:
+        raise ValueError(f"front end is {model.front_end.value!r}, expected 'world'")
+    n = len(path.capture_ns)
+    moments, bounds = rows_of(Moment, n), rows_of(Least, n)
+    if n == 0:
+        return bounds
+    rows = columns_of(moments)
+    rows["capture_ns"], rows["measured"], rows["wanted"] = path.capture_ns, path.measured, wanted
+    for k, name in enumerate(State._fields):
+        rows["leader"][name] = path.leader[:, k]
+    for k, name in enumerate(Pose._fields):
+        rows["follower"][name] = path.follower_pose[:, k]
+    rows["v2"], rows["u2"] = path.follower_motion.T
+    terms = rows_of(Terms, 1)
+    store(terms, 0, Terms(model.limits, model.noise, pose_noise, *sd_motion))
+    carry_bounds(moments, terms, bounds)
+    return bounds

@@ -98,39 +98,42 @@ def _coverage(columns: Columns, errors: Mapping[str, FloatArray]) -> dict[str, f
 
 def _efficiency(evidence: Evidence, columns: Columns, rmse: Mapping[str, float]) -> dict[str, float]:
     given = evidence.scenario
-    pose_noise, sd_v2, sd_u2 = _noise(given, emulated=evidence.motion_since_ns is not None)
-    bounded = given.estimator.front_end == "world" and pose_noise.position > 0.0
-    if not bounded or evidence.frames is None or not rmse:
+    emulated = evidence.motion_since_ns is not None
+    if evidence.frames is None or not rmse:
+        return {}
+    received = np.asarray(evidence.frames.captures_ns, dtype=np.int64)
+    bounds = least_deviations(given, columns, received, emulated=emulated)
+    sizes = {name: bound[np.isfinite(bound)] for name, bound in bounds.items()}
+    best = {name: _rms(bound) if len(bound) else 0.0 for name, bound in sizes.items()}
+    return {name: rmse[name] / best[name] for name in rmse if best.get(name, 0.0) > 0.0}
+
+
+def least_deviations(
+    scenario: Scenario, columns: Columns, received_ns: Stamps, *, emulated: bool
+) -> dict[str, FloatArray]:
+    """Posterior Cramer-Rao bound by quantity, at one in :data:`EVERY` samples of the columns.
+
+    ``received_ns``: captures whose frames arrived. ``emulated``: whether the noise is the emulator's. Empty
+    where there is no such bound: off the world front end, without noise, or where the truth is not all known.
+    """
+    noise, sd_v2, sd_u2 = _noise(scenario, emulated=emulated)
+    if scenario.estimator.front_end != "world" or noise.position <= 0.0:
         return {}
     truth = columns.truth
     near = inside(truth.capture_ns, Span(columns.span.from_ns - WARM_UP_NS, columns.span.to_ns))
-    heading = truth.leader[near, 2]
-    leader = np.column_stack(
-        [
-            truth.leader[near, :2],
-            truth.v1[near] * np.cos(heading),
-            truth.v1[near] * np.sin(heading),
-            truth.u1[near],
-        ]
-    )
+    heading, v1 = truth.leader[near, 2], truth.v1[near]
+    velocity = (v1 * np.cos(heading), v1 * np.sin(heading))
+    leader = np.column_stack([truth.leader[near, :2], *velocity, truth.u1[near]])
     motion = np.column_stack([truth.v2[near], truth.u2[near]])
     if not np.all(np.isfinite(leader)) or not np.all(np.isfinite(motion)):
         return {}
     moments = truth.capture_ns[near]
-    path = TruePath(
-        capture_ns=moments,
-        leader=leader,
-        follower_pose=truth.follower[near],
-        follower_motion=motion,
-        measured=np.isin(moments, np.asarray(evidence.frames.captures_ns, dtype=np.int64)),
-    )
-    at_samples = _nearest(moments, columns.samples.capture_ns)[::EVERY]
+    measured = np.isin(moments, received_ns)
+    path = TruePath(moments, leader, truth.follower[near], motion, measured)
     wanted = np.zeros(len(moments), dtype=np.bool_)
-    wanted[at_samples] = True
-    bounds = cramer_rao(path, _model(given), pose_noise, sd_v2, sd_u2, wanted)
-    sizes = {name: bound[np.isfinite(bound)] for name, bound in bounds.items()}
-    best = {name: _rms(bound) if len(bound) else 0.0 for name, bound in sizes.items()}
-    return {name: rmse[name] / best[name] for name in rmse if best[name] > 0.0}
+    wanted[_nearest(moments, columns.samples.capture_ns)[::EVERY]] = True
+    bounds = cramer_rao(path, _model(scenario), noise, sd_v2, sd_u2, wanted)
+    return {name: bound[wanted] for name, bound in bounds.items()}
 
 
 def _nearest(moments_ns: Stamps, wanted_ns: Stamps) -> NDArray[np.int64]:

@@ -135,10 +135,14 @@ def evaluation_span(evidence: Evidence) -> Span:
     to_ns = run.to_ns if evidence.evaluate_to_ns is None else evidence.evaluate_to_ns
     from_ns = evidence.evaluate_from_ns
     if from_ns is None:
-        from_ns = evidence.zero_ns + round(evidence.scenario.run.evaluate_from_s * 1e9)
-        if from_ns >= to_ns:
-            from_ns = (run.from_ns + to_ns) // 2
+        from_ns = judged_from_ns(evidence.scenario, evidence.zero_ns, Span(run.from_ns, to_ns))
     return Span(from_ns, to_ns)
+
+
+def judged_from_ns(scenario: Scenario, zero_ns: int, run: Span) -> int:
+    """From when on a run is judged whose time in seconds counts from ``zero_ns``."""
+    from_ns = zero_ns + round(scenario.run.evaluate_from_s * 1e9)
+    return from_ns if from_ns < run.to_ns else (run.from_ns + run.to_ns) // 2
 
 
 def evidence_of_log(log: Log, scenario: Scenario | None = None) -> Evidence:

@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation.angles import FloatArray, wrap
-from formation.pose import Motion, Pose
-from formation.shape import shape_of, shape_rates
 from hil.wire.message_types import Truth
 from hil.wire.messages import to_ns
 
@@ -55,6 +53,11 @@ class TrueStates:
         moments_ns, first = np.unique(stamps, return_index=True)
         return _states(moments_ns, _with_shape(told[first]))
 
+    @staticmethod
+    def along(moments_ns: Stamps, told: FloatArray) -> TrueStates:
+        """Columns of increasing moments: rows (n, 10) of both poses, v1, u1, v2, u2."""
+        return _states(moments_ns, _with_shape(told))
+
     def at(self, moments_ns: Stamps) -> TrueStates:
         """The truth at other moments: exact where there is one, else linear between its neighbours.
 
@@ -88,17 +91,17 @@ def _states(moments_ns: Stamps, rows: FloatArray) -> TrueStates:
 
 
 def _with_shape(told: FloatArray) -> FloatArray:
-    """Rows of both poses and both motions with the shape and its rates behind."""
+    """Rows of both poses and both motions with the shape and its rates behind: Eqs. (2) and (3) of the paper.
+
+    NaN where both robots are in one place: there is no shape.
+    """
     told[:, _HEADINGS] = wrap(told[:, _HEADINGS])
-    shapes = np.array(list(map(_shape_and_rates, told.tolist())), dtype=np.float64)
-    return np.column_stack([told, shapes.reshape(-1, _SHAPE_SIZE)])
-
-
-def _shape_and_rates(told: list[float]) -> tuple[float, float, float, float, float]:
-    lx, ly, ltheta, fx, fy, ftheta, v1, u1, v2, u2 = told
-    try:
-        shape = shape_of(Pose(lx, ly, ltheta), Pose(fx, fy, ftheta))
-    except ValueError:  # both in one place: there is no shape
-        return math.nan, math.nan, math.nan, math.nan, math.nan
-    rates = shape_rates(shape, Motion(v1, u1), Motion(v2, u2))
-    return shape.rho, shape.alpha1, shape.alpha2, rates.rho_dot, rates.alpha2_dot
+    lx, ly, ltheta, fx, fy, ftheta, v1, _, v2, u2 = told.T
+    dx, dy = fx - lx, fy - ly
+    rho, line = np.hypot(dx, dy), np.arctan2(dy, dx)
+    rho = np.where(rho > 0.0, rho, math.nan)
+    apart = 0.0 * rho
+    alpha1, alpha2 = wrap(line - ltheta) + apart, wrap(line + math.pi - ftheta) + apart
+    turning = (v1 * np.sin(alpha1) + v2 * np.sin(alpha2)) / rho
+    rho_dot = -v1 * np.cos(alpha1) - v2 * np.cos(alpha2)
+    return np.column_stack([told, rho, alpha1, alpha2, rho_dot, turning - u2])

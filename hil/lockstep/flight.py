@@ -86,9 +86,10 @@ class Flight(NamedTuple):
 
 
 class TrueFrame(NamedTuple):
-    """The truth behind a capture of one pair."""
+    """The truth behind a capture of one pair; ``arrives``: whether its frame is not lost."""
 
     at_ns: int
+    arrives: bool
     leader: Pose
     follower: Pose
     leader_motion: Motion

@@ -73,6 +73,7 @@ class Flown:
     ``estimates``, ``commands``: of all followers, in the order in which they were made.
     """
 
+    pairs: int
     since_ns: int
     truth: NDArray[np.void]
     estimates: NDArray[np.void]
@@ -131,6 +132,7 @@ class Flyer:
         flight = columns_of(self._flight)[0]
         rooms = self.rooms
         return Flown(
+            pairs=self.followers,
             since_ns=int(flight["world"]["motion_since_ns"]),
             truth=columns_of(rooms.truth)[: int(flight["captures"]) * self.followers],
             estimates=columns_of(rooms.estimates)[: int(flight["estimates"])],

@@ -128,9 +128,10 @@ def _lab_tick(flight: Flight, plan: Plan, rooms: Rooms, now_ns: int) -> Flight:
             return flight._replace(stage=SHORT_OF_NUMBERS)
         if happened.kind == NOTHING:
             break
+        arrives = step.world.lost == flight.world.lost
         flight = flight._replace(world=step.world)
         if happened.kind == CAPTURE:
-            flight = _captured(flight, plan, rooms, happened)
+            flight = _captured(flight, plan, rooms, happened, arrives)
         elif happened.kind == FRAME:
             waiting = _frame(plan, rooms, happened, now_ns, waiting)
         else:
@@ -139,12 +140,14 @@ def _lab_tick(flight: Flight, plan: Plan, rooms: Rooms, now_ns: int) -> Flight:
 
 
 @kernel
-def _captured(flight: Flight, plan: Plan, rooms: Rooms, happened: Happened) -> Flight:
+def _captured(flight: Flight, plan: Plan, rooms: Rooms, happened: Happened, arrives: bool) -> Flight:
     """Keep the truth of a capture, and pass an operator's orders on."""
     world, n = flight.world, size(rooms.clocks)
     for k in range(n):
         ahead, behind = load(Robot, rooms.lab.robots, k), load(Robot, rooms.lab.robots, k + 1)
-        true = TrueFrame(happened.at_ns, pose_of(ahead), pose_of(behind), ahead.motion, behind.motion)
+        true = TrueFrame(
+            happened.at_ns, arrives, pose_of(ahead), pose_of(behind), ahead.motion, behind.motion
+        )
         store(rooms.truth, happened.number * n + k, true)
     flight = flight._replace(captures=happened.number + 1)
     if world.motion_since_ns < 0:

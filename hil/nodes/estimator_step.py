@@ -134,7 +134,7 @@ def by_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> 
 
 @kernel
 def due_pose(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> OwnPoint:
-    """The follower's pose, ready to be folded into its own track, with the odometry of its moment if fused."""
+    """The follower's pose, ready to be folded into its own track, with odometry if that is fused."""
     told = rules.source == FUSED and known.odometry.length > 0
     odometry = FollowerMotion(0.0, 0.0, 0.0, 0.0)
     if told:

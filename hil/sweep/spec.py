@@ -13,11 +13,12 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
+from estimation.filters.estimators import ESTIMATORS
 from hil.errors import UsageError
 from hil.scenario.checked_toml import checked, locate, read_toml
 from hil.scenario.files import load_scenario, with_overrides
 from hil.scenario.schema import NonNegative, Positive, Probability, Scenario
-from hil.sweep.engine_rules import KINDS, refuse_unknown
+from hil.sweep.refusals import refuse_unsweepable
 
 SHORTEST_S = 1.0
 """Shortest run that a sweep takes: the judge looks at its second half."""
@@ -110,14 +111,14 @@ def load_sweep(name_or_path: str, **changes: Any) -> Sweep:
     tree |= {key: value for key, value in changes.items() if value is not None}
     spec = checked(tree, SweepSpec, f"sweep {path.stem}")
     for estimator in spec.estimators:
-        if estimator not in KINDS:
+        if estimator not in ESTIMATORS:
             raise UsageError(
-                f"sweep {path.stem}: estimators has {estimator!r}, expected some of: {', '.join(KINDS)}"
+                f"sweep {path.stem}: estimators has {estimator!r}, expected some of: {', '.join(ESTIMATORS)}"
             )
     scenario = load_scenario(spec.scenario, [*spec.set, f"run.duration_s={spec.duration_s!r}"])
     sweep = Sweep(spec, scenario)
     for cell in sweep.cells():
-        refuse_unknown(sweep.scenario_of(cell))
+        refuse_unsweepable(sweep.scenario_of(cell))
     return sweep
 
 

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.errors import UsageError
+from hil.lockstep.flyer import STOPPING_S, Flyer
 from hil.scenario.certificate import certificate_of
 from hil.scenario.files import build_scenario, scenario_text
 from hil.scenario.schema import Scenario
-from hil.sweep.engine import Engine
 from hil.sweep.spec import Cell, Sweep, run_seed
-from hil.sweep.tally import TALLY, judge_run, orbit_of
+from hil.sweep.tally import TALLY, judge_run, judged_span, orbit_of
 
 RUNS_AT_ONCE = 50
 """Runs of a piece: fractions of a second of work, so that little is lost and nobody waits long."""
@@ -49,10 +49,13 @@ def pieces_of(sweep: Sweep) -> Iterator[Piece]:
 def fly_piece(sweep: Sweep, piece: Piece) -> NDArray[np.void]:
     """Tallies of the runs of a piece; they depend on nothing else."""
     scenario = sweep.scenario_of(piece.cell)
-    engine, allowed, orbit = Engine(scenario), allowed_distances(sweep.scenario), orbit_of(scenario)
+    from_ns, latency_s = judged_span(scenario).from_ns, scenario.mocap.latency_s
+    flyer = Flyer(scenario, judged_from_ns=from_ns, after_s=min(latency_s, STOPPING_S))
+    allowed, orbit = allowed_distances(sweep.scenario), orbit_of(scenario)
     tallies = np.zeros(piece.last - piece.first, TALLY)
     for row, run in enumerate(range(piece.first, piece.last)):
-        tallies[row] = judge_run(engine, engine.fly(run_seed(sweep.spec.seed, run)), allowed, orbit)[0]
+        flown = flyer.fly(run_seed(sweep.spec.seed, run))
+        tallies[row] = judge_run(scenario, flown, allowed, orbit)[0]
     return tallies
 
 

@@ -43,9 +43,10 @@ def test_seeds_of_runs_depend_on_sweep_and_number_only() -> None:
         (SMALL + "[grids]\n", "unknown key"),
         (SMALL.replace("loss = [0.1]", "loss = [1.5]"), "loss"),
         (SMALL.replace("[0.0003, 0.002]", "[]"), "sigma_position"),
-        (SMALL.replace('"difference"', '"imm"'), "imm"),
+        (SMALL.replace('"difference"', '"kalman"'), "kalman"),
         (SMALL.replace("max_age_s=0.4", "max_edge_s=0.4"), "max_age_s"),
-        (SMALL.replace("controller.max_age_s=0.4", "mocap.jitter_s=0.01"), "jitter_s"),
+        (SMALL.replace("controller.max_age_s=0.4", "mocap.clock_jump_s=0.2"), "clock_jump_s"),
+        (SMALL.replace("controller.max_age_s=0.4", "estimator.align_odometry=true"), "align_odometry"),
         (SMALL.replace("duration_s = 5.0", "duration_s = 1e9"), "duration_s is 1000000000.0"),
     ],
 )
