@@ -50,13 +50,13 @@ def _places() -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def one_at_a_time() -> Iterator[None]:
-    """Among all processes that share a cache: who comes second finds what the first has compiled."""
+def one_at_a_time(module: str) -> Iterator[None]:
+    """Among all processes that share a cache: who comes second finds what the first compiled of a module."""
     folder = cache_folder()
     if folder is None:
         yield
         return
-    with (folder / "compiling.lock").open("a") as lock:
+    with (folder / f"{module}.lock").open("a") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 

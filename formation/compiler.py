@@ -20,8 +20,8 @@ from numba.extending import infer_getattr, overload
 from formation import records
 from formation.compile_cache import cache_of, one_at_a_time
 from formation.compiled_records import record_type, teach_records
-from formation.kernel import MARKED, Marked
 from formation.kernel_linking import EntryCompiler, KernelCompiler
+from formation.marked import MARKED, Marked
 
 _JIT = {"error_model": "numpy", "fastmath": False}
 _KERNEL = _JIT | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": KernelCompiler}
@@ -55,7 +55,7 @@ def compiled(function: Callable[..., Any]) -> Any:
     cache = cache_of(function)
     if cache is not None:
         dispatcher._cache = cache
-    with one_at_a_time(), _collector_paused():
+    with one_at_a_time(function.__module__), _collector_paused():
         dispatcher.compile(signature)
     dispatcher.disable_compile()
     return dispatcher

@@ -18,20 +18,11 @@ import functools
 import importlib.util
 import os
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar, overload
+from typing import Any, TypeVar, overload
+
+from formation.marked import MARKED, Marked
 
 F = TypeVar("F", bound=Callable[..., Any])
-
-
-class Marked(NamedTuple):
-    """A function that is a kernel; ``inline``: whether compiled code takes it in where it is called."""
-
-    function: Callable[..., Any]
-    inline: bool
-
-
-MARKED: list[Marked] = []
-"""All kernels so far, in the order of their definition."""
 
 
 @overload

@@ -54,6 +54,12 @@ WORLDLY = {
 COMPILER = {"formation/kernel.py", "formation/compile_cache.py"}
 """What may look at files and the environment all the same: where compiled code is kept."""
 
+COMPILES = {
+    "formation/compiler.py", "formation/compiled_records.py", "formation/compile_cache.py",
+    "formation/kernel_linking.py",
+}  # fmt: skip
+"""What alone may import numba: all else is plain Python, which runs without it."""
+
 NAMELESS = {"common", "helper", "helpers", "manager", "misc", "util", "utils"}
 LONGEST_MODULE = 400
 
@@ -112,6 +118,7 @@ def test_a_module_keeps_to_its_floor(path: Path) -> None:
     if package in PURE and named(path) not in COMPILER:
         assert not used & WORLDLY
         assert not called(path) & {"open", "print", "input", "exec", "eval", "__import__"}
+    assert not used & {"numba", "llvmlite"} or named(path) in COMPILES
     assert len(path.read_text(encoding="utf-8").splitlines()) <= LONGEST_MODULE
     assert not set(path.stem.split("_")) & NAMELESS
 

@@ -13,7 +13,7 @@ from estimation.models.measurement import FrontEnd, Measurement
 from estimation.models.motion import Matrix, Vector
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Modes:
     """Memory of an estimator of several models: the belief of each, and the probability that it holds."""
 

@@ -22,6 +22,6 @@ def refuse_unsweepable(scenario: Scenario) -> None:
     for key, value, is_right, expected, why in refusals:
         if not is_right:
             raise UsageError(
-                f"scenario {scenario.name}: {key} is {value!r}, but a sweep takes {expected}, as {why} in plain "
-                "Python; set it so, or use abreast run --lockstep"
+                f"scenario {scenario.name}: {key} is {value!r}, but a sweep takes {expected}, as {why} in "
+                "plain Python; set it so, or use abreast run --lockstep"
             )

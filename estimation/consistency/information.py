@@ -1,0 +1,98 @@
+"""The recursion behind the Cramer-Rao bound: the steps of the EKF, taken at the truth."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from estimation.filters.ekf import extended_moved, informed
+from estimation.filters.gaussian import Gaussian, started
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, Spread, State
+from estimation.models.measurement import PoseNoise, measure_world
+from estimation.tracking.estimate import estimate_of
+from estimation.tracking.track_point import JumpUncertainty
+from formation.kernel import kernel
+from formation.pose import Pose
+from formation.records import Rows, load, size, store
+
+_NS = 1e-9
+
+
+class Moment(NamedTuple):
+    """The truth at one capture; ``wanted``: whether the bound is to be mapped to the quantities here."""
+
+    capture_ns: int
+    leader: State
+    follower: Pose
+    v2: float
+    u2: float
+    measured: bool
+    wanted: bool
+
+
+class Terms(NamedTuple):
+    """What a bound rests on: the leader's limits and noise, that of poses, of v2 [m/s] and u2 [rad/s]."""
+
+    limits: LeaderLimits
+    noise: ProcessNoise
+    pose: PoseNoise
+    sd_v2: float
+    sd_u2: float
+
+
+class Least(NamedTuple):
+    """Bound after one capture: of the state, and the least variances of the quantities where wanted."""
+
+    known: bool
+    state: Gaussian
+    rho_dot: float
+    alpha2_dot: float
+    v1: float
+    alpha1: float
+    u1: float
+
+
+@kernel(inline=False)
+def carry(moments: Rows[Moment], terms: Terms, bounds: Rows[Least]) -> None:
+    """Fill the bound after every moment.
+
+    It starts as the filters do, at the first measurement with what the limits say in advance; before it there
+    is none.
+    """
+    variance = terms.pose.position * terms.pose.position
+    spread, known = Spread(variance, 0.0, variance), False
+    belief = started(0.0, 0.0, spread, terms.limits)
+    before = load(Moment, moments, 0)
+    for k in range(size(moments)):
+        moment = load(Moment, moments, k)
+        if known:
+            dt = (moment.capture_ns - before.capture_ns) * _NS
+            belief = extended_moved(_at(belief, before.leader), dt, terms.noise)
+            if moment.measured:
+                belief = informed(belief, belief.x, belief.y, spread)
+        elif moment.measured:
+            known = True
+            belief = started(moment.leader.x, moment.leader.y, spread, terms.limits)
+        belief = _at(belief, moment.leader)
+        least = Least(known, belief, math.inf, math.inf, math.inf, math.inf, math.inf)
+        if known and moment.wanted:
+            least = _mapped(belief, moment, terms)
+        store(bounds, k, least)
+        before = moment
+
+
+@kernel
+def _at(belief: Gaussian, state: State) -> Gaussian:
+    """The same covariance about another state."""
+    return belief._replace(x=state.x, y=state.y, vx=state.vx, vy=state.vy, u=state.u)
+
+
+@kernel
+def _mapped(belief: Gaussian, moment: Moment, terms: Terms) -> Least:
+    """Bound mapped to the quantities, to first order."""
+    motion = FollowerMotion(moment.v2, moment.u2, terms.sd_v2, terms.sd_u2)
+    leader = (moment.leader.x, moment.leader.y)
+    here = measure_world(moment.capture_ns, leader, moment.follower, terms.pose, motion)
+    jump = JumpUncertainty(0.0, 0.0, 0)
+    joint = estimate_of(belief, here, 0, math.nan, moment.capture_ns, jump).joint
+    return Least(True, belief, joint.r_r, joint.a_a, joint.v_v, joint.b_b, joint.u_u)

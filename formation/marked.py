@@ -1,0 +1,17 @@
+"""The kernels there are: what ``@kernel`` has marked, for the compiler to learn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+
+class Marked(NamedTuple):
+    """A function that is a kernel; ``inline``: whether compiled code takes it in where it is called."""
+
+    function: Callable[..., Any]
+    inline: bool
+
+
+MARKED: list[Marked] = []
+"""All kernels so far, in the order of their definition."""
