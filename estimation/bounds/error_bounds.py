@@ -19,11 +19,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from formation.angles import FloatArray, wrap
+from estimation.bounds.live_bounds import LawConstants, Moment
+from formation.angles import FloatArray
+from formation.records import row_of
 from formation.spacing import Spacing
 from formation.station import ABREAST, Station
 
 Values = float | FloatArray
+
+_NO_LAW = LawConstants(0.0, 0.0, 1.0, 1.0, 0.0)
+"""For bounds that no law enters."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,13 +111,10 @@ def extended_v1(perceived: Perceived, rates: RateErrors, inputs: InputErrors) ->
 
     (X, Y) = (-rho_dot, rho a) - v2 (cos(alpha2), sin(alpha2)) with a = alpha2_dot + u2. The first part errs
     by M_rho and, as rho a - rho_hat a_hat = (rho - rho_hat) a + rho_hat (a - a_hat), by
-    m_Y = E_rho (|a_hat| + M_alpha2 + E_u2) + rho_hat (M_alpha2 + E_u2); the second by :func:`_motion_error`.
+    m_Y = E_rho (|a_hat| + M_alpha2 + E_u2) + rho_hat (M_alpha2 + E_u2); the second by
+    :func:`~.live_bounds.motion_error`.
     """
-    turn_error = np.asarray(rates.M_alpha2) + inputs.E_u2
-    turn = np.abs(np.asarray(perceived.alpha2_dot) + perceived.u2)
-    m_y = inputs.E_rho * (turn + turn_error) + perceived.rho * turn_error
-    bound: FloatArray = np.hypot(rates.M_rho, m_y) + _motion_error(perceived, inputs)
-    return bound
+    return _bounds(perceived, rates, inputs, 0.0, _NO_LAW).v1
 
 
 def paper_alpha1(perceived: Perceived, rates: RateErrors, v_eps: Values) -> FloatArray:
@@ -135,14 +137,14 @@ def sound_alpha1(perceived: Perceived, rates: RateErrors, v_eps: Values) -> Floa
     as well in a disc around the true one, whose distance from the origin is v1 >= v_eps, and so
     arcsin(M / v_eps) holds too. If M reaches both, any direction is possible.
     """
-    return _subtended(sound_v1(perceived, rates), perceived.v1, v_eps)
+    return extended_alpha1(perceived, rates, InputErrors(), v_eps)
 
 
 def extended_alpha1(
     perceived: Perceived, rates: RateErrors, inputs: InputErrors, v_eps: Values
 ) -> FloatArray:
     """:func:`sound_alpha1` with M_XY of :func:`extended_v1` in the place of M [rad]."""
-    return _subtended(extended_v1(perceived, rates, inputs), perceived.v1, v_eps)
+    return _bounds(perceived, rates, inputs, v_eps, _NO_LAW).alpha1
 
 
 def paper_h(perceived: Perceived, rates: RateErrors, mu1: float, spacing: Spacing) -> FloatArray:
@@ -181,12 +183,8 @@ def sound_bounds(
     spacing: Spacing,
     station: Station = ABREAST,
 ) -> Bounds:
-    """:func:`sound_v1`, :func:`sound_alpha1` and :func:`sound_h` at once: each builds on the one before."""
-    v1 = sound_v1(perceived, rates)
-    alpha1 = _subtended(v1, perceived.v1, v_eps)
-    f = np.abs(spacing.f(np.asarray(perceived.rho)))
-    change = cosine_change(perceived.alpha1 + station.to_abreast, alpha1)
-    return Bounds(v1, alpha1, rates.M_alpha2 + mu1 * change + f * v1)
+    """:func:`sound_v1`, :func:`sound_alpha1` and :func:`sound_h` at once: extended ones of exact inputs."""
+    return extended_bounds(perceived, rates, InputErrors(), v_eps, mu1, spacing, station)
 
 
 def extended_h(
@@ -223,65 +221,28 @@ def extended_bounds(
     station: Station = ABREAST,
 ) -> Bounds:
     """:func:`extended_v1`, :func:`extended_alpha1` and :func:`extended_h` at once."""
-    v1 = extended_v1(perceived, rates, inputs)
-    alpha1 = _subtended(v1, perceived.v1, v_eps)
-    rho = np.asarray(perceived.rho)
-    known = rho > inputs.E_rho
-    lo = np.where(known, rho - inputs.E_rho, rho)
-    stretch = inputs.E_rho / lo
-    f_lo, f_hat, f_hi = spacing.f(lo), spacing.f(rho), spacing.f(rho + inputs.E_rho)
-
-    turn = np.abs(np.asarray(perceived.alpha2_dot) + perceived.u2)
-    line = rates.M_alpha2 + inputs.E_u2 + stretch * turn + _sideways_error(perceived, inputs) / lo
-    off = perceived.alpha1 + station.to_abreast
-    bearing = mu1 * (cosine_change(off, alpha1) + stretch * np.abs(np.cos(off)))
-    largest_f = np.maximum(np.abs(f_lo), np.abs(f_hi))
-    f_change = np.maximum(f_hat - f_lo, f_hi - f_hat)
-    distance = v1 * largest_f + perceived.v1 * (f_change + stretch * np.abs(f_hat))
-    return Bounds(v1, alpha1, np.where(known, line + bearing + distance, math.inf))
+    law = LawConstants.of(0.0, mu1, spacing, station)
+    return _bounds(perceived, rates, inputs, v_eps, law)
 
 
-def cosine_change(angle: Values, span: Values) -> FloatArray:
-    """Largest |cos(x) - cos(angle)| over |x - angle| <= span; span in [0, pi].
+def _bounds(
+    perceived: Perceived, rates: RateErrors, inputs: InputErrors, v_eps: Values, law: LawConstants
+) -> Bounds:
+    from estimation.bounds.entries import bound_all  # compiles, which who only needs the records is spared
 
-    Fold the angle to [0, pi]. There the cosine falls, and so its extremes lie at the ends of the span, cut
-    off at 0 and pi. The product form keeps its digits when the span is tiny.
-    """
-    folded = np.abs(wrap(np.asarray(angle)))
-    near, far = np.maximum(folded - span, 0.0), np.minimum(folded + span, math.pi)
-    rise = 2.0 * np.sin(0.5 * (folded + near)) * np.sin(0.5 * (folded - near))
-    fall = 2.0 * np.sin(0.5 * (far + folded)) * np.sin(0.5 * (far - folded))
-    bound: FloatArray = np.maximum(rise, fall)
-    return bound
-
-
-def _subtended(radius: FloatArray, v1: Values, v_eps: Values) -> FloatArray:
-    """Half angle under which a disc of this radius is seen over max(v1, v_eps); pi from within."""
-    longest = np.maximum(v1, v_eps)
-    outside = radius < longest
-    ratio = np.where(outside, radius, 0.0) / np.where(outside, longest, 1.0)
-    return np.where(outside, np.arcsin(ratio), math.pi)
-
-
-def _motion_error(perceived: Perceived, inputs: InputErrors) -> FloatArray:
-    """Largest error of v2 (cos(alpha2), sin(alpha2)) [m/s]; exact.
-
-    The square of the chord, (v2 - v2_hat)^2 + 4 v2 v2_hat sin^2((alpha2 - alpha2_hat)/2), is convex in v2 and
-    so is largest at |v2| = |v2_hat| + E_v2.
-    """
-    speed = np.abs(np.asarray(perceived.v2))
-    half = np.sin(0.5 * np.minimum(inputs.E_alpha2, math.pi))
-    bound: FloatArray = np.hypot(inputs.E_v2, 2.0 * half * np.sqrt(speed * (speed + inputs.E_v2)))
-    return bound
-
-
-def _sideways_error(perceived: Perceived, inputs: InputErrors) -> FloatArray:
-    """Largest error of v2 sin(alpha2) alone [m/s]: near pi/2 much less than :func:`_motion_error`."""
-    change = cosine_change(np.asarray(perceived.alpha2) - 0.5 * math.pi, np.minimum(inputs.E_alpha2, math.pi))
-    bound: FloatArray = np.minimum(
-        inputs.E_v2 + np.abs(np.asarray(perceived.v2)) * change, _motion_error(perceived, inputs)
+    columns = (
+        *(getattr(perceived, name) for name in Moment._fields),
+        *(getattr(rates, name) for name in ("M_rho", "M_alpha2")),
+        *(getattr(inputs, name) for name in ("E_rho", "E_alpha2", "E_v2", "E_u2")),
+        v_eps,
     )
-    return bound
+    shape = np.broadcast_shapes(*map(np.shape, columns))
+    moments, found = np.empty((len(columns), *shape)), np.empty((3, *shape))
+    for k, column in enumerate(columns):
+        moments[k] = column
+    count = math.prod(shape)
+    bound_all(moments.reshape(len(columns), count), row_of(law), found.reshape(3, count))
+    return Bounds(*found)
 
 
 def _require_magnitudes(**bounds: Values) -> None:

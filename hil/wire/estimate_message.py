@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from estimation.bounds.error_bounds import InputErrors, Perceived, RateErrors
 from estimation.bounds.guarantees import guaranteed_rate, leader_acceleration
-from estimation.bounds.live_bounds import ErrorBounds, LawConstants, live_bounds
+from estimation.bounds.live_bounds import ErrorBounds, LawConstants, Moment, MomentBounds, bounds_at
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.own_motion.steady_noise import steady_noise
 from estimation.tracking.estimate import Estimate, joint_of
@@ -55,7 +55,7 @@ class AssumedErrors:
             bearing_grows=mocap,
             E_v2=_SIGMAS * sd_v2,
             E_u2=_SIGMAS * sd_u2,
-            law=LawConstants(
+            law=LawConstants.of(
                 leader.v_eps,
                 scenario.controller.mu1,
                 Spacing(scenario.formation.rho_0, scenario.controller.mu_rho),
@@ -107,20 +107,22 @@ def perceived(estimate: Estimate) -> Perceived:
     )
 
 
-def bounds_of(estimate: Estimate, assumed: AssumedErrors) -> tuple[float, float, float]:
+def bounds_of(estimate: Estimate, assumed: AssumedErrors) -> MomentBounds:
     """Extended bounds of v1 [m/s], alpha1 [rad] and h [rad/s] of an estimate, its jump included."""
     rho = max(estimate.rho, 1e-6)
     errors = assumed.errors(rho)
     if estimate.jump.since_ns:
         errors = _with_jump(errors, estimate, rho)
-    return live_bounds(
-        (estimate.rho, estimate.alpha2),
-        (estimate.v1, estimate.alpha1),
-        (estimate.v2, estimate.u2),
+    seen = Moment(
+        estimate.rho,
+        estimate.alpha2,
         estimate.alpha2_dot,
-        errors,
-        assumed.law,
+        estimate.v1,
+        estimate.alpha1,
+        estimate.v2,
+        estimate.u2,
     )
+    return bounds_at(seen, errors, assumed.law)
 
 
 def _with_jump(errors: ErrorBounds, estimate: Estimate, rho: float) -> ErrorBounds:

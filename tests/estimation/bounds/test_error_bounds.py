@@ -12,7 +12,6 @@ from estimation.bounds.error_bounds import (
     InputErrors,
     Perceived,
     RateErrors,
-    cosine_change,
     extended_alpha1,
     extended_h,
     extended_v1,
@@ -22,6 +21,7 @@ from estimation.bounds.error_bounds import (
     sound_h,
     sound_v1,
 )
+from estimation.bounds.live_bounds import cosine_change
 from formation.pose import Motion
 from formation.shape import leader_velocity, polar_velocity
 from formation.spacing import Spacing
@@ -58,7 +58,20 @@ def extended(perceived: Perceived, rates: RateErrors, inputs: InputErrors) -> di
     }
 
 
-def sound(perceived: Perceived, rates: RateErrors) -> dict[str, np.ndarray]:
+def sound(perceived: Perceived, rates: RateErrors) -> dict[str, float]:
+    """By the formulas of the docstrings, written apart from the package."""
+    v1 = math.hypot(float(rates.M_rho), float(perceived.rho) * float(rates.M_alpha2))
+    longest = max(float(perceived.v1), V_EPS)
+    alpha1 = math.asin(v1 / longest) if v1 < longest else math.pi
+    middle = float(perceived.alpha1)
+    inner = [k * math.pi for k in range(-3, 4) if abs(k * math.pi - middle) <= alpha1]
+    ends = [middle - alpha1, middle + alpha1, *inner]
+    change = max(abs(math.cos(x) - math.cos(middle)) for x in ends)
+    f = 20.0 * (1.0 - 0.04 / float(perceived.rho) ** 2)
+    return {"v1": v1, "alpha1": alpha1, "h": float(rates.M_alpha2) + MU1 * change + abs(f) * v1}
+
+
+def sound_form(perceived: Perceived, rates: RateErrors) -> dict[str, np.ndarray]:
     return {
         "v1": sound_v1(perceived, rates),
         "alpha1": sound_alpha1(perceived, rates, V_EPS),
@@ -138,9 +151,10 @@ def test_cosine_change_is_the_maximum_found_by_search(angle: float, span: float)
 def test_without_input_errors_the_extended_form_is_the_sound_form(
     perceived: Perceived, rates: RateErrors
 ) -> None:
-    expected = sound(perceived, rates)
+    expected, told = sound(perceived, rates), sound_form(perceived, rates)
     for name, bound in extended(perceived, rates, InputErrors()).items():
-        assert bound == pytest.approx(expected[name], rel=1e-12, abs=1e-15), name
+        assert bound == pytest.approx(float(told[name]), rel=1e-14), name
+        assert bound == pytest.approx(expected[name], rel=1e-9, abs=1e-14), name
 
 
 @given(perceived=moments, rates=rate_errors, inputs=input_errors, more=st.floats(0.0, 0.3))
