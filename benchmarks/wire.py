@@ -20,11 +20,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from formation.pose import Motion, Pose
 from formation.records import Rows, row_of, rows_of, store
 from hil.emulator.lab_messages import frame_message, odometry_message
+from hil.emulator.mocap import seen_pose
 from hil.wire import entries, templates
 from hil.wire import message_types as msg
 from hil.wire.cdr import packed_texts
 from hil.wire.drive_message import drive_message, read_drive
-from hil.wire.message_checks import ANY_TIME_NS, upright
+from hil.wire.message_checks import ANY_TIME_NS
 from hil.wire.messages import decode_as, encode, header, to_time
 from hil.wire.records import (
     Body,
@@ -32,6 +33,7 @@ from hil.wire.records import (
     EstimateNumbers,
     FrameHead,
     Odometry,
+    Placement,
     Receipt,
     Stamp,
     TruthNumbers,
@@ -44,6 +46,12 @@ PAIR = (Pose(1.0, 2.0, 0.3), Pose(0.5, 1.5, -0.4))
 NAMES = ("leader", "follower")
 RECEIPTS = 3
 NUMBERS = EstimateNumbers(NOW_NS, NOW_NS, NOW_NS, 1, 0, RECEIPTS, *[0.5] * 13)
+
+
+def upright(pose: Pose) -> Placement:
+    """Place of a body with z up that stands on the ground."""
+    seen = seen_pose(pose)
+    return Placement(seen.x, seen.y, 0.0, 0.0, 0.0, seen.qz, seen.qw)
 
 
 def bodies_of(poses: tuple[Pose, ...]) -> Rows[Body]:

@@ -102,7 +102,7 @@ def copy_of(rows: Rows[R]) -> Rows[R]:
     """New rows that hold the same."""
     held = columns_of(rows)
     # As bytes: numpy would copy padded rows field by field.
-    return cast("Rows[R]", held.view(np.uint8).copy().view(held.dtype))
+    return cast("Rows[R]", np.frombuffer(bytearray(held.tobytes()), held.dtype))
 
 
 def columns_of(rows: Rows[R]) -> NDArray[np.void]:
@@ -112,19 +112,17 @@ def columns_of(rows: Rows[R]) -> NDArray[np.void]:
 
 def load(kind: type[R], rows: Rows[R], k: int) -> R:
     """The k-th row as a named tuple."""
-    if isinstance(rows, list | _ListPart):
-        kept: R = rows[k]
-        return kept
-    made: R = _maker(cast("Any", kind))(columns_of(rows)[k].item())
-    return made
+    if isinstance(rows, np.ndarray):
+        made: R = _maker(cast("Any", kind))(rows[k].item())
+        return made
+    kept: R = cast("Any", rows)[k]
+    return kept
 
 
 def store(rows: Rows[R], k: int, record: R) -> None:
     """Put a named tuple into the k-th row."""
-    if isinstance(rows, list | _ListPart):
-        rows[k] = record
-    else:
-        columns_of(rows)[k] = record
+    # An array, or in plain Python a list.
+    cast("Any", rows)[k] = record
 
 
 def borrowed(rows: Rows[R]) -> Rows[R]:
@@ -164,13 +162,13 @@ class _ListPart:
 def _maker(kind: Any) -> Callable[[Any], Any]:
     """Function that makes a named tuple out of nested plain tuples."""
     hints = get_type_hints(kind)
-    nested = {k: _maker(hints[name]) for k, name in enumerate(fields_of(kind)) if is_record(hints[name])}
-    if not nested:
-        plain: Callable[[Any], Any] = kind._make
+    makers = [_maker(hints[name]) if is_record(hints[name]) else None for name in fields_of(kind)]
+    plain: Callable[[Any], Any] = kind._make
+    if not any(makers):
         return plain
 
     def made(values: Any) -> Any:
-        return kind._make(nested[k](value) if k in nested else value for k, value in enumerate(values))
+        return plain([make(value) if make else value for make, value in zip(makers, values, strict=True)])
 
     return made
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from formation.kernel import entry
+from formation.kernel import entry, kernel
 from formation.leader import TableRow
 from formation.pose import Motion, Pose
-from formation.records import Rows, borrowed, load, store
+from formation.records import Buffer, Indices, Rows, borrowed, load, store
 from hil.emulator.faults import Fault
 from hil.emulator.mocap import BodyNormals, SeenPose, Shares
-from hil.emulator.robot import Robot
+from hil.emulator.robot import Robot, pose_of
 from hil.emulator.world import (
     Happened,
     Lab,
@@ -20,6 +20,12 @@ from hil.emulator.world import (
     commanded,
     halted,
 )
+from hil.wire.cdr import write_placement
+from hil.wire.command_layout import write_truth
+from hil.wire.frame_layout import write_frame_head
+from hil.wire.odometry_layout import write_odometry
+from hil.wire.records import Odometry as ToldOdometry
+from hil.wire.records import Placement, TruthNumbers, stamp_of
 
 
 @entry
@@ -68,3 +74,51 @@ def command_robot(
 def halt_robots(world: Rows[World], lab: Rows[Lab], robots: Rows[Robot], now_ns: int) -> None:
     """Stop all robots now, for good."""
     store(world, 0, halted(load(World, world, 0), load(Lab, lab, 0), borrowed(robots), now_ns))
+
+
+@kernel
+def _placed(seen: SeenPose) -> Placement:
+    """A pose in space of what stands on the ground."""
+    return Placement(seen.x, seen.y, 0.0, 0.0, 0.0, seen.qz, seen.qw)
+
+
+@entry
+def tell_frame(
+    buffer: Buffer, places_at: Indices, stamp_ns: int, number: int, seen: Rows[SeenPose], first: int
+) -> None:
+    """Fill :func:`hil.wire.templates.frame_template` with the bodies in the rows from ``first`` on."""
+    write_frame_head(buffer, places_at, stamp_ns, number)
+    for k in range(len(places_at) - 1):
+        write_placement(buffer, places_at[k + 1], _placed(load(SeenPose, borrowed(seen), first + k)))
+
+
+@entry
+def tell_odometry(buffer: Buffer, numbers_at: int, stamp_ns: int, odometry: Rows[Odometry], k: int) -> None:
+    """Fill :func:`hil.wire.templates.odometry_template` with what a robot says of itself in the k-th row."""
+    told = load(Odometry, borrowed(odometry), k)
+    message = ToldOdometry(True, stamp_of(stamp_ns), _placed(told.pose), told.motion.v, told.motion.u)
+    write_odometry(buffer, numbers_at, stamp_ns, message)
+
+
+@entry
+def tell_truth(
+    buffer: Buffer, number_at: int, stamp_ns: int, number: int, robots: Rows[Robot], k: int
+) -> None:
+    """Fill :func:`hil.wire.templates.truth_template` with the k-th robot, a leader, and the next."""
+    leader, follower = load(Robot, borrowed(robots), k), load(Robot, borrowed(robots), k + 1)
+    first, second = pose_of(leader), pose_of(follower)
+    numbers = TruthNumbers(
+        stamp_ns,
+        number,
+        first.x,
+        first.y,
+        first.theta,
+        leader.motion.v,
+        leader.motion.u,
+        second.x,
+        second.y,
+        second.theta,
+        follower.motion.v,
+        follower.motion.u,
+    )
+    write_truth(buffer, number_at, numbers)

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from itertools import pairwise
 
 from msgspec import Struct, field
 from msgspec.structs import replace
 
 from formation.pose import STANDSTILL
-from hil.emulator.lab_messages import seen_message, told_message, truth_message
+from hil.emulator.lab_writer import LabWriter
 from hil.emulator.mocap import whole_ns
 from hil.emulator.plant import Plant
 from hil.emulator.robot import Robot
@@ -26,7 +25,7 @@ from hil.scenario.schema import Scenario
 from hil.scenario.start import chain_poses
 from hil.wire import message_types as msg
 from hil.wire import topics
-from hil.wire.drive_message import drive_message, read_drive
+from hil.wire.drive_message import read_drive
 from hil.wire.events import Event
 from hil.wire.messages import MalformedPayloadError, decode_as
 from hil.wire.topics import link_topics
@@ -81,6 +80,7 @@ class EmulatorNode:
         self.pairs = [link_topics(link) for link in links]
         self.topics = self.pairs[0]
         self.names = (self.topics.leader, *(pair.follower for pair in self.pairs))
+        self.writer = LabWriter(self.names, self.pairs)
         self.poses = chain_poses(scenario, len(self.names))
         self.delayed = whole_ns(scenario.robot.odometry_delay_s) > 0
         self.orders = ordered_sides(scenario)
@@ -151,7 +151,8 @@ class EmulatorNode:
             if happened.kind == CAPTURE:
                 state = self._tell_truth(state, happened, out)
             elif happened.kind == FRAME:
-                out.append(self._frame(state.plant, happened))
+                seen = (happened.slot, happened.stamp_ns, happened.number, happened.at_ns)
+                out.append(self.writer.frame(state.plant, *seen))
             else:
                 self._tell_odometry(state.plant, happened, out)
         return state, tuple(out)
@@ -159,8 +160,7 @@ class EmulatorNode:
     def _tell_truth(self, state: EmulatorState, happened: Happened, out: list[Outgoing]) -> EmulatorState:
         """Publish the truth of a capture, and what goes with it: an operator's order, a report."""
         at_ns, number, since_ns = happened.at_ns, happened.number, state.plant.motion_since_ns
-        for pair, (leader, follower) in zip(self.pairs, pairwise(state.plant.robots()), strict=True):
-            out.append(outgoing(pair.truth, truth_message(at_ns, number, leader, follower), at_ns))
+        out += self.writer.truths(state.plant, at_ns, number)
         if self.orders and since_ns >= 0 and not state.plant.stopped:
             state = self._order(state, (at_ns - since_ns) * _NS, at_ns, out)
         if at_ns >= state.next_diagnostics_ns or at_ns == since_ns:
@@ -176,23 +176,12 @@ class EmulatorNode:
             out.append(outgoing(self.topics.side, order, at_ns))
         return state
 
-    def _frame(self, plant: Plant, happened: Happened) -> Outgoing:
-        bodies = zip(self.names, plant.seen(happened.slot), strict=True)
-        frame = seen_message(happened.stamp_ns, happened.number, bodies)
-        return outgoing(topics.RIGID_BODIES, frame, happened.at_ns)
-
     def _tell_odometry(self, plant: Plant, happened: Happened, out: list[Outgoing]) -> None:
         """Publish odometry that arrives, without delay at the sample itself, and what the leader drives."""
-        stamp_ns = happened.stamp_ns
         if happened.kind != SAMPLE or not self.delayed:
-            for name, told in zip(self.names, plant.told(happened.slot), strict=True):
-                message = told_message(stamp_ns, name, told.pose, told.motion)
-                out.append(outgoing(f"{name}/odom", message, stamp_ns))
+            out += self.writer.odometry(plant, happened.slot, happened.stamp_ns)
         if happened.kind == SAMPLE:
-            drives = drive_message(
-                plant.robot(0).goal, stamp_ns, self.topics.leader, stamped=self.topics.stamped
-            )
-            out.append(outgoing(self.topics.leader_cmd_vel, drives, stamp_ns))
+            out.append(self.writer.drives(plant, happened.stamp_ns))
 
     def report(self, state: EmulatorState, now_ns: int) -> Outgoing:
         """Diagnostics: what the start barrier still waits for, since when the leader moves, frames lost."""

@@ -169,16 +169,6 @@ class Plant:
         """All robots as they are now."""
         return tuple(self.robot(k) for k in range(self._robots))
 
-    def seen(self, slot: int) -> list[SeenPose]:
-        """What the frame in a slot shows of each body."""
-        first = slot * self._robots
-        return [load(SeenPose, self.memory.seen, first + k) for k in range(self._robots)]
-
-    def told(self, slot: int) -> list[Odometry]:
-        """The odometry in a slot, of each robot."""
-        first = slot * self._robots
-        return [load(Odometry, self.memory.odometry, first + k) for k in range(self._robots)]
-
     def _draw(self) -> None:
         """Draw the next block of frames or samples, whichever has run out."""
         world, memory = self.world(), self.memory

@@ -7,15 +7,15 @@ from msgspec.structs import replace
 
 from controllers.follower import Command
 from controllers.station_keeper import StationState, at_station
-from estimation.tracking.estimate import QUANTITIES
-from estimation.tracking.prediction import Reported, SentCommand, Sight, rows_for
+from estimation.tracking.prediction import SentCommand, Sight, rows_for
 from estimation.tracking.tracker import Status
 from formation.pose import Motion
 from formation.records import Rows, columns_of, copy_of, load, row_of, rows_of
 from formation.ring import place
 from formation.station import Side
+from hil.nodes.command_writer import CommandWriter
 from hil.nodes.control_rules import control_rules
-from hil.nodes.controller_entries import NO_REPORT, ControlEvent, Happening, Outcome
+from hil.nodes.controller_entries import NO_REPORT, ControlEvent, Happening, Outcome, hear_estimate
 from hil.nodes.controller_entries import control as control_step
 from hil.nodes.controller_step import ControlState, begun
 from hil.nodes.leader_turn import SOURCES, TurnSource
@@ -34,15 +34,16 @@ from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
-from hil.wire.drive_message import drive_message, read_drive
-from hil.wire.estimate_message import from_message
+from hil.wire.drive_message import read_drive
 from hil.wire.events import Event
-from hil.wire.messages import MalformedPayloadError, decode_as, header, to_time
+from hil.wire.messages import MalformedPayloadError, decode_as, in_little_endian, typename_of
+from hil.wire.records import Receipt
 from hil.wire.topics import topics_of
+from hil.wire.writing import MOST_RECEIPTS, DriveWriter
 
 NAME = "controller"
 _DIAGNOSTICS_NS = 500_000_000
-_U1 = QUANTITIES.index("u1")
+_COMMAND, _ESTIMATE = typename_of(msg.Command), typename_of(msg.LeaderEstimate)
 _CAUSES = {Outcome.BAD_STAMP.value: "bad_stamp", Outcome.UNSAFE_ORDER.value: "unsafe_side_change"}
 
 
@@ -54,7 +55,7 @@ class ControllerState(Struct, frozen=True):
 
     control: Rows[ControlState]
     commands: Rows[SentCommand]
-    receipts: tuple[msg.Consumed, ...] = ()
+    receipts: tuple[Receipt, ...] = ()
     refused: Counts = field(default_factory=no_counts)
     decided: Counts = field(default_factory=no_counts)
     next_diagnostics_ns: int = 0
@@ -99,6 +100,8 @@ class ControllerNode:
         self.topics = topics_of(scenario)
         self.rules = row_of(control_rules(scenario))
         self.station = station(scenario)
+        self.writer = CommandWriter(self.topics.follower)
+        self.driver = DriveWriter(self.topics.follower, stamped=self.topics.stamped)
         self.rows = rows_for(scenario.controller.max_age_s + scenario.controller.transport_s)
         is_told = SOURCES[scenario.controller.law] is TurnSource.TOLD
         leader = (self.topics.leader_cmd_vel,) if is_told else ()
@@ -119,31 +122,37 @@ class ControllerNode:
     ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
         """Take in an estimate, a stop or a tick; each leads to a command."""
         if event.topic:
-            state = replace(state, receipts=(*state.receipts, consumed(event, now_ns)))
+            receipts = (*state.receipts, consumed(event, now_ns))[-MOST_RECEIPTS:]
+            state = replace(state, receipts=receipts)
         happened, cause = self._read(event)
         state = replace(state, control=copy_of(state.control), commands=copy_of(state.commands))
         result = rows_of(Command, 1)
-        outcome = control_step(state.control, self.rules, state.commands, row_of(happened), result, now_ns)
+        outcome = control_step(state.control, self.rules, state.commands, happened, result, now_ns)
         if cause := cause or _CAUSES.get(outcome, ""):
             return replace(state, refused=counted(state.refused, cause)), ()
         if outcome != Outcome.COMMAND:
             return state, ()
         command = load(Command, result, 0)
-        receipts = state.receipts
+        fresh = bool(columns_of(happened)["status"][0] == Status.TRACKING)
+        record = self.writer.write(state.control, result, state.receipts, now_ns, fresh=fresh)
+        drive = self.driver.write(Motion(command.v, command.u), now_ns)
+        out = (
+            Outgoing(self.topics.cmd_vel, self.driver.typename, drive, now_ns),
+            Outgoing(self.topics.command, _COMMAND, record, now_ns),
+        )
         word = command.stop.value if command.stop else "driving"
-        state = replace(state, receipts=(), decided=counted(state.decided, word))
-        fresh = happened.kind == Happening.ESTIMATE and happened.status == Status.TRACKING
-        return self._speak(state, self._messages(state, command, receipts, now_ns, fresh=fresh), now_ns)
+        return self._speak(replace(state, receipts=(), decided=counted(state.decided, word)), out, now_ns)
 
-    def _read(self, event: Event) -> tuple[ControlEvent, str]:
+    def _read(self, event: Event) -> tuple[Rows[ControlEvent], str]:
         """What an event says, or that it is nothing and by what cause."""
+        if not event.topic:
+            return _TICK, ""
+        if event.topic == self.topics.estimate:
+            heard, whole = rows_of(ControlEvent, 1), in_little_endian(event.payload, _ESTIMATE)
+            return (heard, "") if hear_estimate(whole, heard) else (_NOTHING, "malformed")
+        if event.topic == topics.STOP:
+            return _happened(Happening.STOP), ""
         try:
-            if not event.topic:
-                return _happened(Happening.TICK), ""
-            if event.topic == topics.STOP:
-                return _happened(Happening.STOP), ""
-            if event.topic == self.topics.estimate:
-                return _reported(decode_as(event.payload, msg.LeaderEstimate)), ""
             if event.topic == self.topics.leader_cmd_vel:
                 told = read_drive(event.payload, stamped=self.topics.stamped)
                 return _happened(Happening.LEADER, told.u), ""
@@ -151,43 +160,10 @@ class ControllerNode:
                 word = decode_as(event.payload, msg.String).data
                 return _happened(Happening.ORDER, Side(word).sign), ""
         except MalformedPayloadError:
-            return _happened(Happening.NOTHING), "malformed"
+            return _NOTHING, "malformed"
         except ValueError:
-            # A status that does not exist, or a side.
-            is_side = event.topic == self.topics.side
-            return _happened(Happening.NOTHING), "unknown_side" if is_side else "malformed"
-        return _happened(Happening.NOTHING), ""
-
-    def _messages(
-        self,
-        state: ControllerState,
-        command: Command,
-        receipts: tuple[msg.Consumed, ...],
-        now_ns: int,
-        *,
-        fresh: bool,
-    ) -> tuple[Outgoing, ...]:
-        # Not by loading all: this is done for each message.
-        row, sent = columns_of(state.control)[0], Motion(command.v, command.u)
-        stamps = row["sight"][["capture_ns", "measured_ns"]].item() if row["known"] else (0, 0)
-        drive = drive_message(sent, now_ns, self.topics.follower, stamped=self.topics.stamped)
-        record = msg.Command(
-            header=header(now_ns, self.topics.follower),
-            capture=to_time(stamps[0]),
-            measured=to_time(stamps[1]),
-            v2=command.v,
-            u2=command.u,
-            v2_wanted=command.v_wanted,
-            u2_wanted=command.u_wanted,
-            saturated=command.saturated,
-            stop=command.stop.value if command.stop else "",
-            fresh=fresh,
-            consumed=receipts,
-        )
-        return (
-            outgoing(self.topics.cmd_vel, drive, now_ns),
-            outgoing(self.topics.command, record, now_ns),
-        )
+            return _NOTHING, "unknown_side"
+        return _NOTHING, ""
 
     def _speak(
         self, state: ControllerState, out: tuple[Outgoing, ...], now_ns: int
@@ -207,26 +183,11 @@ class ControllerNode:
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
 
 
-def _happened(kind: Happening, number: float = 0.0) -> ControlEvent:
-    return ControlEvent(kind.value, 0, number, NO_REPORT)
+def _happened(kind: Happening, number: float = 0.0) -> Rows[ControlEvent]:
+    return row_of(ControlEvent(kind.value, 0, number, NO_REPORT))
 
 
-def _reported(message: msg.LeaderEstimate) -> ControlEvent:
-    """What a message says of an estimate; raises ValueError for a status that does not exist."""
-    estimate = from_message(message)
-    reported = Reported(
-        estimate.capture_ns,
-        estimate.measured_ns,
-        estimate.rho,
-        estimate.alpha2,
-        estimate.v1,
-        estimate.alpha1,
-        estimate.u1,
-        float(estimate.covariance[_U1, _U1]),
-        estimate.v2,
-        estimate.u2,
-    )
-    return ControlEvent(Happening.ESTIMATE.value, int(estimate.status), 0.0, reported)
+_TICK, _NOTHING = _happened(Happening.TICK), _happened(Happening.NOTHING)
 
 
 def _side_report(station: StationState) -> dict[str, object]:

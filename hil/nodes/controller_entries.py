@@ -8,7 +8,7 @@ from typing import NamedTuple
 from controllers.follower import Command
 from estimation.tracking.prediction import Reported, SentCommand
 from formation.kernel import entry, kernel
-from formation.records import Rows, borrowed, load, store
+from formation.records import Buffer, Rows, borrowed, load, read_float, store
 from hil.nodes.controller_step import (
     ControlRules,
     ControlState,
@@ -20,6 +20,10 @@ from hil.nodes.controller_step import (
     heard_order,
     heard_stop,
 )
+from hil.wire.command_layout import write_command
+from hil.wire.estimate_layout import read_estimate
+from hil.wire.message_checks import is_estimate
+from hil.wire.records import CommandNumbers, ReadEstimate, Receipt
 
 
 class Happening(IntEnum):
@@ -57,6 +61,7 @@ class ControlEvent(NamedTuple):
 
 NO_REPORT = Reported(0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
+_VAR_U1_BYTES = 24 * 8
 _TICK, _ESTIMATE, _STOP = Happening.TICK.value, Happening.ESTIMATE.value, Happening.STOP.value
 _LEADER, _ORDER = Happening.LEADER.value, Happening.ORDER.value
 _NO_COMMAND, _COMMAND = Outcome.NO_COMMAND.value, Outcome.COMMAND.value
@@ -84,6 +89,61 @@ def _taken(state: ControlState, rules: ControlRules, event: ControlEvent, now_ns
         ordered = heard_order(state, rules, event.number)
         return _Taken(ordered.state, _NO_COMMAND if ordered.taken else _UNSAFE_ORDER)
     return _Taken(state, _COMMAND if event.kind == _TICK else _NO_COMMAND)
+
+
+@kernel
+def _reported(payload: bytes, read: ReadEstimate) -> Reported:
+    n = read.numbers
+    var_u1 = read_float(payload, read.covariance_at + _VAR_U1_BYTES)
+    return Reported(n.capture_ns, n.measured_ns, n.rho, n.alpha2, n.v1, n.alpha1, n.u1, var_u1, n.v2, n.u2)
+
+
+@entry
+def hear_estimate(payload: bytes, events: Rows[ControlEvent]) -> bool:
+    """Read an estimate into ``events`` (1,); whether it is one."""
+    read = read_estimate(payload)
+    if not is_estimate(read):
+        return False
+    event = ControlEvent(_ESTIMATE, read.numbers.status, 0.0, _reported(payload, read))
+    store(borrowed(events), 0, event)
+    return True
+
+
+@entry
+def tell_command(
+    buffer: Buffer,
+    times_at: int,
+    stops: bytes,
+    states: Rows[ControlState],
+    results: Rows[Command],
+    receipts: Rows[Receipt],
+    consumed: int,
+    fresh: bool,
+    now_ns: int,
+) -> int:
+    """Fill :func:`hil.wire.templates.command_template` with the command in ``results``; returns the length.
+
+    ``states``: that of the controller after it. ``stops``: texts of the reasons to stand still, by their
+    code. ``consumed``: how many of the receipts are meant.
+    """
+    state, told = load(ControlState, borrowed(states), 0), load(Command, borrowed(results), 0)
+    capture_ns, measured_ns = 0, 0
+    if state.known:
+        capture_ns, measured_ns = state.sight.capture_ns, state.sight.measured_ns
+    numbers = CommandNumbers(
+        now_ns,
+        capture_ns,
+        measured_ns,
+        told.reason,
+        consumed,
+        told.v,
+        told.u,
+        told.v_wanted,
+        told.u_wanted,
+        told.saturated,
+        fresh,
+    )
+    return write_command(buffer, times_at, stops, numbers, borrowed(receipts))
 
 
 @entry

@@ -20,10 +20,12 @@ from estimation.own_motion.odometry_correction import (
 )
 from estimation.own_motion.odometry_history import IDEAL
 from estimation.time.host_time import HostTime
+from estimation.tracking.estimate import Estimate
 from estimation.tracking.follower_check import Cause
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE, Verdict
 from estimation.tracking.tracker import Status
 from formation.angles import wrap
+from formation.records import columns_of, load
 from hil.nodes.certifying import Believed, certifying
 from hil.nodes.estimator_memory import EstimatorMemory, rules_of
 from hil.nodes.estimator_step import Outcome
@@ -40,22 +42,25 @@ from hil.nodes.node import (
     outgoing,
 )
 from hil.nodes.sensor_offsets import offsets_report
-from hil.nodes.status_reasons import reason_for
+from hil.nodes.status_reasons import ALL_REASONS, reason_number
 from hil.scenario.files import refuse_unrunnable
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.certified_message import certified_message
-from hil.wire.estimate_message import AssumedErrors, to_message
+from hil.wire.estimate_message import AssumedErrors
 from hil.wire.events import Event
-from hil.wire.message_types import Consumed
+from hil.wire.message_types import LeaderEstimate
+from hil.wire.messages import typename_of
 from hil.wire.reading import RefusedError, read_frame, read_odometry, read_sighting
+from hil.wire.records import Receipt
 from hil.wire.topics import topics_of
+from hil.wire.writing import MOST_RECEIPTS, EstimateWriter
 
 NAME = "estimator"
 _TICK_NS = 50_000_000
 _DIAGNOSTICS_NS = 500_000_000
 _SAME_PLACE = 1e-3  # two robots whose centres are this close [m] are one body under two names
-_MOST_RECEIPTS = 4096  # odometry without any frame must not fill the memory; its history is far shorter
+_ESTIMATE = typename_of(LeaderEstimate)
 _UNUSED = (GATED, DUPLICATE, LATE)
 _UNKNOWN_MOTION = FollowerMotion(0.0, 0.0, 0.0, 0.0)
 
@@ -74,7 +79,7 @@ class EstimatorState(Struct, frozen=True):
     watch: OdometryWatch = NOTHING_SEEN
     times: HostTime = HostTime()
     believed: Believed = Believed()
-    receipts: tuple[Consumed, ...] = ()
+    receipts: tuple[Receipt, ...] = ()
     refused: Counts = field(default_factory=no_counts)
     taken: Counts = field(default_factory=no_counts)
     next_tick_ns: int = 0
@@ -105,6 +110,7 @@ class EstimatorNode:
         EstimatorMemory(self.rules)  # now, and not with the first message, all is compiled or loaded
         self.aligns = given.align_odometry and given.own_motion != "mocap"
         self.assumed = AssumedErrors.of(scenario)
+        self.writer = EstimateWriter(self.topics.follower, self.assumed, ALL_REASONS)
         self.frame_time = FrameTime(scenario)
         self.certifying = certifying(scenario)
         self._handlers: dict[str, Callable[[EstimatorState, bytes, int], tuple[EstimatorState, bool]]] = {
@@ -134,7 +140,7 @@ class EstimatorNode:
         if now_ns < state.heard_ns - CLOCK_TOLERANCE_NS:
             # The clock was set back: all that comes would be too late for what was heard before.
             state = self._forgotten(state)
-        receipts = (*state.receipts, consumed(event, now_ns))[-_MOST_RECEIPTS:]
+        receipts = (*state.receipts, consumed(event, now_ns))[-MOST_RECEIPTS:]
         state = replace(state, receipts=receipts, heard_ns=now_ns)
         try:
             state, is_new = handler(state, event.payload, now_ns)
@@ -214,14 +220,15 @@ class EstimatorNode:
         return state, verdict not in (Verdict.DUPLICATE, Verdict.LATE)
 
     def _publish(self, state: EstimatorState, now_ns: int) -> tuple[EstimatorState, tuple[Outgoing, ...]]:
-        told = state.memory.estimate(now_ns)
-        if told is None:
+        cause = state.memory.tell(now_ns)
+        if cause is None:
             return state, ()
-        estimate = told.estimate
-        reason = reason_for(Status(estimate.status), Cause(told.cause))
-        message = to_message(estimate, now_ns, self.topics.follower, reason, self.assumed, state.receipts)
-        out = [outgoing(self.topics.estimate, message, estimate.capture_ns)]
+        newest = state.memory.newest
+        capture_ns, status = columns_of(newest)[["capture_ns", "status"]][0].item()
+        payload = self.writer.write(newest, reason_number(status, cause), now_ns, state.receipts)
+        out = [Outgoing(self.topics.estimate, _ESTIMATE, payload, capture_ns)]
         if self.certifying is not None:
+            estimate = load(Estimate, newest, 0)
             certain = self.certifying.certain(state.believed, state.memory.history, estimate.capture_ns)
             certified = certified_message(estimate, certain, now_ns, self.topics.follower)
             out.append(outgoing(self.topics.certified, certified, estimate.capture_ns))

@@ -16,7 +16,7 @@ from estimation.tracking.estimate import Estimate
 from estimation.tracking.track import Track, as_filter
 from estimation.tracking.track_point import TrackPoint
 from estimation.tracking.tracker import Status, status_of
-from formation.records import Rows, load, row_of, rows_of, store
+from formation.records import Rows, columns_of, load, row_of, rows_of, store
 from formation.ring import EMPTY
 from hil.nodes import estimator_step as step
 from hil.nodes.estimator_step import FUSED, MOCAP, ODOMETRY, Known, Memory, Outcome, Rules, Told
@@ -64,6 +64,7 @@ class EstimatorMemory:
         self._own = rows_of(OwnPoint, self._room)
         self._known = row_of(_NOTHING)
         self._sample = rows_of(MotionSample, 1)
+        self.newest = rows_of(Estimate, 1)
         if self._compiled:
             from hil.nodes import estimator_entries as entries
 
@@ -71,7 +72,6 @@ class EstimatorMemory:
             self._points = rows_of(TrackPoint, self._room)
             self._rules = row_of(rules)
             self._shown, self._seen = rows_of(entries.Shown, 1), rows_of(Measurement, 1)
-            self._estimate = rows_of(Estimate, 1)
         else:
             self._points = cast("Rows[TrackPoint]", [None] * self._room)
 
@@ -98,7 +98,7 @@ class EstimatorMemory:
     @property
     def begun(self) -> bool:
         """Whether there is a track of the leader."""
-        return self.known.track.length > 0
+        return bool(columns_of(self._known)["track"]["length"][0] > 0)
 
     @property
     def history(self) -> History:
@@ -145,12 +145,18 @@ class EstimatorMemory:
 
     def estimate(self, now_ns: int) -> Told | None:
         """Newest estimate and why the newest measurement was not used; None before there is any."""
+        cause = self.tell(now_ns)
+        return None if cause is None else Told(load(Estimate, self.newest, 0), cause)
+
+    def tell(self, now_ns: int) -> int | None:
+        """As :meth:`estimate`, which is left in ``newest``, a row; returns the cause alone."""
         if not self.begun:
             return None
-        if not self._compiled:
-            return step.estimate(self.known, self._points, self.rules, now_ns)
-        cause = self._entries.estimate(self._points, self._known, self._rules, now_ns, self._estimate)
-        return Told(load(Estimate, self._estimate, 0), cause)
+        if self._compiled:
+            return self._entries.estimate(self._points, self._known, self._rules, now_ns, self.newest)
+        told = step.estimate(self.known, self._points, self.rules, now_ns)
+        store(self.newest, 0, told.estimate)
+        return told.cause
 
     def status(self, now_ns: int) -> Status:
         """Status of the track for one who looks at it at ``now_ns``."""

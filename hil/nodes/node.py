@@ -12,8 +12,9 @@ from typing import Protocol, TypeVar
 from msgspec import Struct
 
 from hil.wire.events import Event
-from hil.wire.message_types import Consumed, DiagnosticArray, DiagnosticStatus, KeyValue, Message
-from hil.wire.messages import encode, header, to_time, typename_of
+from hil.wire.message_types import DiagnosticArray, DiagnosticStatus, KeyValue, Message
+from hil.wire.messages import encode, header, typename_of
+from hil.wire.records import Receipt, receipt_of
 
 S = TypeVar("S")
 
@@ -58,9 +59,9 @@ def is_due(due_ns: int, period_ns: int, now_ns: int) -> bool:
     return not now_ns < due_ns <= now_ns + period_ns
 
 
-def consumed(event: Event, now_ns: int) -> Consumed:
+def consumed(event: Event, now_ns: int) -> Receipt:
     """Receipt for an event that a node took in at ``now_ns``."""
-    return Consumed(event.digest, to_time(now_ns))
+    return receipt_of(event.digest, now_ns)
 
 
 def no_counts() -> Counts:

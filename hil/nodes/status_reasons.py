@@ -21,6 +21,18 @@ REJECTIONS = {
 }
 
 
+_CAUSES = max(Cause) + 1
+
+
+def reason_number(status: int, cause: int) -> int:
+    """Where the reason of :func:`reason_for` stands among :data:`ALL_REASONS`."""
+    return status * _CAUSES + cause
+
+
 def reason_for(status: Status, cause: Cause) -> str:
     """Why an estimate is not TRACKING, ``cause`` being that of its point; empty if it is."""
     return REJECTIONS.get(cause, REASONS[status]) if status is Status.REJECTING else REASONS[status]
+
+
+ALL_REASONS = tuple(reason_for(status, Cause(cause)) for status in sorted(Status) for cause in range(_CAUSES))
+"""The reason for every status and cause, in the order of :func:`reason_number`."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from formation.pose import Motion
+from hil.wire import entries
 from hil.wire import message_types as msg
-from hil.wire.messages import decode, header, typename_of
+from hil.wire.messages import MalformedPayloadError, header, in_little_endian, typename_of
 
 
 def drive_message(motion: Motion, stamp_ns: int, frame_id: str, *, stamped: bool) -> msg.Message:
@@ -20,8 +21,8 @@ def read_drive(payload: bytes, *, stamped: bool) -> Motion:
 
     Raises :class:`~hil.wire.messages.MalformedPayloadError` for a payload that is none.
     """
-    message = decode(payload, typename_of(msg.TwistStamped if stamped else msg.Twist))
-    twist = message.twist if isinstance(message, msg.TwistStamped) else message
-    if not isinstance(twist, msg.Twist):
-        raise TypeError(f"expected a Twist, got {type(twist)}")
-    return Motion(twist.linear.x, twist.angular.z)
+    kind = typename_of(msg.TwistStamped if stamped else msg.Twist)
+    drive = entries.read_drive(in_little_endian(payload, kind), stamped)
+    if not drive.sound:
+        raise MalformedPayloadError(f"{len(payload)} bytes, expected a {kind}")
+    return Motion(drive.v, drive.u)

@@ -6,9 +6,11 @@ of many fields lie in rows of the caller's, as to hand Python twenty numbers tak
 
 from __future__ import annotations
 
+from estimation.tracking.estimate import Estimate
 from formation.kernel import entry
 from formation.records import Buffer, Indices, Rows, Vector, borrowed, load, read_float, store
 from hil.wire import command_layout, drive_layout, estimate_layout, frame_layout, odometry_layout
+from hil.wire.estimate_message import AssumedErrors
 from hil.wire.message_checks import ACCEPTED, check_frame, check_odometry, check_sighting, estimate_cause
 from hil.wire.records import (
     Body,
@@ -24,6 +26,7 @@ from hil.wire.records import (
     TruthNumbers,
     Wanted,
 )
+from hil.wire.told_estimate import told_numbers, write_told
 
 _COVARIANCE = 25
 
@@ -121,6 +124,28 @@ def write_estimate(
     estimate_layout.write_covariance(buffer, times_at, covariance)
     numbers = load(EstimateNumbers, borrowed(estimates), 0)
     return estimate_layout.write_estimate(buffer, times_at, reasons, numbers, borrowed(receipts))
+
+
+@entry
+def tell_estimate(
+    buffer: Buffer,
+    times_at: int,
+    reasons: bytes,
+    told: Rows[Estimate],
+    assumed: Rows[AssumedErrors],
+    reason: int,
+    now_ns: int,
+    receipts: Rows[Receipt],
+    consumed: int,
+) -> int:
+    """Fill :func:`hil.wire.templates.estimate_template` with an estimate; returns the length.
+
+    ``told``, ``assumed``: one row. ``reason``: its number among ``reasons``. ``consumed``: how many of the
+    receipts are meant.
+    """
+    estimate = load(Estimate, told, 0)
+    numbers = told_numbers(estimate, load(AssumedErrors, assumed, 0), reason, consumed, now_ns)
+    return write_told(buffer, times_at, reasons, numbers, estimate.joint, borrowed(receipts))
 
 
 @entry

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from estimation.bounds.error_bounds import InputErrors, Perceived, RateErrors
 from estimation.bounds.guarantees import guaranteed_rate, leader_acceleration
@@ -14,6 +14,7 @@ from estimation.own_motion.steady_noise import steady_noise
 from estimation.tracking.estimate import Estimate, joint_of
 from estimation.tracking.track_point import NO_JUMP
 from estimation.tracking.tracker import Status
+from formation.kernel import kernel
 from formation.spacing import Spacing
 from hil.scenario.leader_model import own_noise
 from hil.scenario.parts import station
@@ -24,8 +25,7 @@ from hil.wire.messages import header, to_ns, to_time
 _SIGMAS = 3.0
 
 
-@dataclass(frozen=True, slots=True)
-class AssumedErrors:
+class AssumedErrors(NamedTuple):
     """Error bounds taken for granted where the truth is not known: three standard deviations of each input.
 
     ``rate`` [m/s] is the guaranteed error of the leader's velocity by noise and acceleration bounds.
@@ -63,18 +63,19 @@ class AssumedErrors:
             ),
         )
 
+    @kernel
     def errors(self, rho: float) -> ErrorBounds:
         """Bounds on the errors of rates and inputs at a distance rho [m] > 0."""
-        sd_bearing = (
-            math.hypot(self.sd_range / rho, self.sd_bearing) if self.bearing_grows else self.sd_bearing
-        )
+        sd_bearing, across = self.sd_bearing, self.sd_range / rho
+        if self.bearing_grows:
+            sd_bearing = math.sqrt(across * across + sd_bearing * sd_bearing)
         return ErrorBounds(
-            M_rho=self.rate + self.E_v2,
-            M_alpha2=self.rate / rho + self.E_u2,
-            E_rho=_SIGMAS * self.sd_range,
-            E_alpha2=_SIGMAS * sd_bearing,
-            E_v2=self.E_v2,
-            E_u2=self.E_u2,
+            self.rate + self.E_v2,
+            self.rate / rho + self.E_u2,
+            _SIGMAS * self.sd_range,
+            _SIGMAS * sd_bearing,
+            self.E_v2,
+            self.E_u2,
         )
 
     def at(self, rho: float) -> tuple[RateErrors, InputErrors]:
@@ -107,11 +108,12 @@ def perceived(estimate: Estimate) -> Perceived:
     )
 
 
+@kernel
 def bounds_of(estimate: Estimate, assumed: AssumedErrors) -> MomentBounds:
     """Extended bounds of v1 [m/s], alpha1 [rad] and h [rad/s] of an estimate, its jump included."""
     rho = max(estimate.rho, 1e-6)
     errors = assumed.errors(rho)
-    if estimate.jump.since_ns:
+    if estimate.jump.since_ns != 0:
         errors = _with_jump(errors, estimate, rho)
     seen = Moment(
         estimate.rho,
@@ -125,6 +127,7 @@ def bounds_of(estimate: Estimate, assumed: AssumedErrors) -> MomentBounds:
     return bounds_at(seen, errors, assumed.law)
 
 
+@kernel
 def _with_jump(errors: ErrorBounds, estimate: Estimate, rho: float) -> ErrorBounds:
     """Errors that allow for a jump too.
 
@@ -134,12 +137,12 @@ def _with_jump(errors: ErrorBounds, estimate: Estimate, rho: float) -> ErrorBoun
     turned = estimate.jump.position / rho
     rate = (estimate.v1 + abs(estimate.v2)) * (turned + estimate.jump.heading)
     return ErrorBounds(
-        M_rho=errors.M_rho + rate,
-        M_alpha2=errors.M_alpha2 + rate / rho,
-        E_rho=errors.E_rho + estimate.jump.position,
-        E_alpha2=errors.E_alpha2 + turned + estimate.jump.heading,
-        E_v2=errors.E_v2,
-        E_u2=errors.E_u2,
+        errors.M_rho + rate,
+        errors.M_alpha2 + rate / rho,
+        errors.E_rho + estimate.jump.position,
+        errors.E_alpha2 + turned + estimate.jump.heading,
+        errors.E_v2,
+        errors.E_u2,
     )
 
 

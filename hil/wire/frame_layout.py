@@ -83,7 +83,13 @@ def write_frame(
     ``places_at``: position of the frame number, then of each body's pose, as
     :func:`hil.wire.templates.frame_template` has them.
     """
-    write_stamp(buffer, HEAD_BYTES, capture_ns)
-    write_int32(buffer, places_at[0], frame_number)
+    write_frame_head(buffer, places_at, capture_ns, frame_number)
     for k in range(size(bodies)):
         write_placement(buffer, places_at[k + 1], load(Body, bodies, k).place)
+
+
+@kernel
+def write_frame_head(buffer: Buffer, places_at: Indices, capture_ns: int, frame_number: int) -> None:
+    """Put stamp and number into a frame, whose poses are still to come."""
+    write_stamp(buffer, HEAD_BYTES, capture_ns)
+    write_int32(buffer, places_at[0], frame_number)

@@ -171,13 +171,6 @@ def planar(place: Placement) -> Pose:
 
 
 @kernel
-def upright(pose: Pose) -> Placement:
-    """Place of a body with z up that stands on the ground."""
-    half = 0.5 * pose.theta
-    return Placement(pose.x, pose.y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
-
-
-@kernel
 def check_odometry(told: Odometry, latest_ns: int) -> CheckedMotion:
     """Check a robot's own motion."""
     cause = ACCEPTED if told.sound else MALFORMED
@@ -209,9 +202,15 @@ def _pair_of_numbers_cause(a: float, b: float, largest: float) -> int:
 
 
 @kernel
+def is_estimate(read: ReadEstimate) -> bool:
+    """Whether an estimate is one, its status included."""
+    return read.sound and read.numbers.status <= _LAST_STATUS
+
+
+@kernel
 def estimate_cause(read: ReadEstimate, latest_ns: int) -> int:
     """Why an estimate is not used: MALFORMED, also for a status that does not exist, or BAD_STAMP."""
     n = read.numbers
-    if not read.sound or n.status > _LAST_STATUS:
+    if not is_estimate(read):
         return MALFORMED
     return ACCEPTED if n.measured_ns <= n.capture_ns and n.capture_ns <= latest_ns else BAD_STAMP

@@ -14,6 +14,7 @@ from formation.pose import Motion, Pose
 from formation.records import columns_of, load, row_of, rows_of, store
 from formation.ring import Ring, place, without_oldest
 from hil.emulator.entries import advance_world, command_robot, halt_robots
+from hil.emulator.mocap import SeenPose
 from hil.emulator.plant import Plant, lab_of, memory_of, world_at
 from hil.emulator.world import (
     CAPTURE,
@@ -124,6 +125,13 @@ def test_without_room_or_random_numbers_nothing_is_lost_but_said() -> None:
     assert load(World, world, 0).underway.length == 4
 
 
+def shown(plant: Plant, slot: int) -> tuple[tuple[float, float], ...]:
+    """Where the frame in a slot shows the robots."""
+    robots = len(plant.memory.robots)
+    seen = (load(SeenPose, plant.memory.seen, robots * slot + k) for k in range(robots))
+    return tuple((pose.x, pose.y) for pose in seen)
+
+
 @given(st.integers(0, 2**30))
 @settings(deadline=None, max_examples=20)
 def test_a_plant_makes_room_and_draws_on_and_frames_keep_their_contents(seed: int) -> None:
@@ -134,7 +142,7 @@ def test_a_plant_makes_room_and_draws_on_and_frames_keep_their_contents(seed: in
     while (happened := plant.advance(2000 * MS)).kind != NOTHING:
         captured += happened.kind == CAPTURE
         if happened.kind == FRAME:
-            arrived[happened.number] = tuple((seen.x, seen.y) for seen in plant.seen(happened.slot))
+            arrived[happened.number] = shown(plant, happened.slot)
     assert captured == 2001
     assert plant.world().samples == 2001
     assert len(set(arrived.values())) == len(arrived) == captured - plant.world().underway.length
