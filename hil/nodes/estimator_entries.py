@@ -9,6 +9,7 @@ from estimation.own_motion.odometry_history import MotionSample
 from estimation.own_motion.own_track import OwnPoint
 from estimation.tracking.estimate import Estimate
 from estimation.tracking.track_point import TrackPoint
+from estimation.tracking.tracker import newest, status_of
 from formation.kernel import entry
 from formation.records import Rows, borrowed, load, store
 from hil.nodes.estimator_step import Known, Memory, Outcome, Rules, by_odometry, outcome_of, take, take_frame
@@ -71,6 +72,13 @@ def odometry(
     sample = load(MotionSample, samples, 0)
     after = taken_odometry(load(Known, known, 0), memory, load(Rules, rules, 0), sample)
     store(known, 0, after)
+
+
+@entry
+def status(points: Rows[TrackPoint], known: Rows[Known], rules: Rows[Rules], now_ns: int) -> int:
+    """Status of a track that has a point, for one who looks at it at ``now_ns``."""
+    point = newest(borrowed(points), load(Known, known, 0).track)
+    return status_of(point, now_ns, load(Rules, rules, 0).settings)
 
 
 @entry

@@ -15,7 +15,7 @@ from estimation.own_motion.own_track import OwnPoint
 from estimation.tracking.estimate import Estimate
 from estimation.tracking.track import Track, as_filter
 from estimation.tracking.track_point import TrackPoint
-from estimation.tracking.tracker import Status, status_of
+from estimation.tracking.tracker import Status, newest, status_of
 from formation.records import Rows, columns_of, load, row_of, rows_of, store
 from formation.ring import EMPTY
 from hil.nodes import estimator_step as step
@@ -160,11 +160,11 @@ class EstimatorMemory:
 
     def status(self, now_ns: int) -> Status:
         """Status of the track for one who looks at it at ``now_ns``."""
-        ring = self.known.track
-        if ring.length == 0:
+        if not self.begun:
             return Status.INITIALISING
-        point = load(TrackPoint, self._points, (ring.first + ring.length - 1) % self._room)
-        return Status(status_of(point, now_ns, self.rules.settings))
+        if self._compiled:
+            return Status(self._entries.status(self._points, self._known, self._rules, now_ns))
+        return Status(status_of(newest(self._points, self.known.track), now_ns, self.rules.settings))
 
     @property
     def _memory(self) -> Memory:
