@@ -1,6 +1,6 @@
 """How strong the tests of a module are: the share of its mutants that they notice.
 
-    scripts/mutants estimation/certificate.py [more modules] [--sample 40 --seed 1] [--least 0.8]
+    scripts/mutants estimation/bounds/certificate.py [more modules] [--sample 40 --seed 1] [--least 0.8]
                     [--tests FILE ...] [--also FILE ...] [--list] [--interpreted] [--jobs N]
 
 Each mutant (see :mod:`benchmarks.mutations`) runs in a copy of the checkout, first against the module's own
@@ -42,7 +42,7 @@ FURTHER = {
     "formation": "test_laws.py",
     "controllers": "test_controller.py",
     "estimation": "test_estimator.py",
-    "hil": "test_simulation.py",
+    "hil": "test_rerun.py",
 }
 """Per package, the test file that runs its modules among others; looked for wherever it lies."""
 
