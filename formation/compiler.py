@@ -1,8 +1,8 @@
 """The compiler behind :mod:`formation.kernel`: types, kernels and entries as numba has them.
 
 Only this module and its three neighbours import numba: :mod:`formation.compiled_records`,
-:mod:`formation.compile_cache` and :mod:`formation.kernel_linking`. What they rest on of its internals is held by
-``tests/formation/test_kernel.py``.
+:mod:`formation.compile_cache` and :mod:`formation.kernel_linking`. What they rest on of its internals is
+held by ``tests/formation/test_kernel.py``.
 """
 
 from __future__ import annotations

@@ -8,7 +8,8 @@ Nothing of the compiler is loaded before the first entry is made, and where numb
 environment has ABREAST_INTERPRETED=1, all stays plain Python: limits and guard run on a robot that has none.
 
 What keeps the bits the same: no ``**``, no ``math.hypot`` or ``math.dist`` in a kernel (the interpreter has
-its own), which a test looks for; no division that may be by zero (it raises in Python), floats written as floats.
+its own), which a test looks for; no division that may be by zero (it raises in Python), floats written as
+floats.
 """
 
 from __future__ import annotations
