@@ -44,7 +44,7 @@ from hil.nodes.estimator_memory import EstimatorMemory
 from hil.scenario.files import load_scenario
 from hil.scenario.parts import gains, leader_program
 from hil.scenario.schema import FaultSection, Scenario
-from hil.wire.estimate_message import bounds_of
+from hil.wire.assumed_errors import bounds_of
 
 PERIOD_NS = 8_333_333
 PERIOD = PERIOD_NS * 1e-9

@@ -17,6 +17,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from benchmarks import layouts
 from formation.pose import Motion, Pose
 from formation.records import Rows, row_of, rows_of, store
 from hil.emulator.lab_messages import frame_message, odometry_message
@@ -72,7 +73,7 @@ def frames() -> dict[str, tuple[Callable[[], object], Callable[[], object]]]:
     shown, frame = bodies_of(PAIR), templates.frame_template("mocap", NAMES)
 
     def write() -> bytes:
-        entries.write_frame(frame.buffer, frame.places_at, NOW_NS, 7, shown)
+        layouts.write_frame(frame.buffer, frame.places_at, NOW_NS, 7, shown)
         return frame.buffer.tobytes()
 
     return {
@@ -97,7 +98,7 @@ def motions() -> dict[str, tuple[Callable[[], object], Callable[[], object]]]:
     command = encode(drive_message(Motion(0.1, 0.2), NOW_NS, "follower", stamped=True))
 
     def write_odometry() -> bytes:
-        entries.write_odometry(own.buffer, own.numbers_at, NOW_NS, told)
+        layouts.write_odometry(own.buffer, own.numbers_at, NOW_NS, told)
         return own.buffer.tobytes()
 
     def write_drive() -> bytes:
@@ -141,23 +142,23 @@ def decisions() -> dict[str, tuple[Callable[[], object], Callable[[], object]]]:
     states, states_of = row_of(TruthNumbers(NOW_NS, 7, *[0.5] * 10)), [0.5] * 10
 
     def write_truth() -> bytes:
-        entries.write_truth(truth.buffer, truth.numbers_at, states)
+        layouts.write_truth(truth.buffer, truth.numbers_at, states)
         return truth.buffer.tobytes()
 
     return {
         "read estimate": (
-            lambda: entries.take_estimate(payload, ANY_TIME_NS, numbers, covariance),
+            lambda: layouts.take_estimate(payload, numbers, covariance),
             lambda: decode_as(payload, msg.LeaderEstimate),
         ),
         "write estimate": (
             lambda: ours.payload(
-                entries.write_estimate(ours.buffer, ours.numbers_at, reasons, numbers, covariance, receipts)
+                layouts.write_estimate(ours.buffer, ours.numbers_at, reasons, numbers, covariance, receipts)
             ),
             lambda: encode(estimate),
         ),
         "write command": (
             lambda: ours_too.payload(
-                entries.write_command(ours_too.buffer, ours_too.numbers_at, reasons, decision, receipts)
+                layouts.write_command(ours_too.buffer, ours_too.numbers_at, reasons, decision, receipts)
             ),
             lambda: encode(command),
         ),

@@ -15,7 +15,7 @@ from hil.judge.columns import Columns, EstimateColumns
 from hil.scenario.certificate import premises_of
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
-from hil.wire.estimate_message import AssumedErrors
+from hil.wire.assumed_errors import AssumedErrors
 
 _ERRORS = ("M_rho", "M_alpha2", "E_rho", "E_alpha2", "E_v2", "E_u2")
 _NEAREST = 1e-6  # m; nobody is nearer, and bounds divide by the distance

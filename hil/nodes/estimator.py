@@ -46,8 +46,8 @@ from hil.nodes.status_reasons import ALL_REASONS, reason_number
 from hil.scenario.files import refuse_unrunnable
 from hil.scenario.schema import Scenario
 from hil.wire import topics
+from hil.wire.assumed_errors import AssumedErrors
 from hil.wire.certified_message import certified_message
-from hil.wire.estimate_message import AssumedErrors
 from hil.wire.events import Event
 from hil.wire.message_types import LeaderEstimate
 from hil.wire.messages import typename_of

@@ -9,18 +9,20 @@ from msgspec.structs import replace
 from estimation.bounds.certified import Certain, Failed
 from estimation.models.measurement import Measurement
 from estimation.tracking.estimate import estimate_of
+from estimation.tracking.follower_check import Cause
 from estimation.tracking.smoother import smooth
 from estimation.tracking.track import Tracker
 from estimation.tracking.track_point import NO_JUMP
+from formation.records import row_of
 from hil.nodes.estimator import NAME, EstimatorNode, EstimatorState
 from hil.nodes.node import Outgoing
-from hil.nodes.status_reasons import REASONS
+from hil.nodes.status_reasons import reason_number
 from hil.scenario.leader_model import refuse_bias_states
 from hil.scenario.schema import Scenario
 from hil.wire.certified_message import certified_message
-from hil.wire.estimate_message import to_message
 from hil.wire.events import Event
 from hil.wire.message_types import CertifiedEstimate, LeaderEstimate
+from hil.wire.messages import decode_as
 
 
 class ListeningEstimator(EstimatorNode):
@@ -70,7 +72,9 @@ def smoothed_estimates(node: ListeningEstimator) -> Smoothed:
         capture_ns, frame_id = measurement.capture_ns, node.topics.follower
         status = tracker.status((point,), capture_ns)
         estimate = estimate_of(point.belief, measurement, status, point.nis, point.used_ns, NO_JUMP)
-        estimates.append(to_message(estimate, capture_ns, frame_id, REASONS[status], node.assumed, ()))
+        reason = reason_number(status, Cause.NONE)
+        told = node.writer.write(row_of(estimate), reason, capture_ns, ())
+        estimates.append(decode_as(told, LeaderEstimate))
         if node.certifying is not None:
             certain = node.certain.get(capture_ns, Failed.UNSEEN)
             certified.append(certified_message(estimate, certain, capture_ns, frame_id))

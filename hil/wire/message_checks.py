@@ -205,12 +205,3 @@ def _pair_of_numbers_cause(a: float, b: float, largest: float) -> int:
 def is_estimate(read: ReadEstimate) -> bool:
     """Whether an estimate is one, its status included."""
     return read.sound and read.numbers.status <= _LAST_STATUS
-
-
-@kernel
-def estimate_cause(read: ReadEstimate, latest_ns: int) -> int:
-    """Why an estimate is not used: MALFORMED, also for a status that does not exist, or BAD_STAMP."""
-    n = read.numbers
-    if not is_estimate(read):
-        return MALFORMED
-    return ACCEPTED if n.measured_ns <= n.capture_ns and n.capture_ns <= latest_ns else BAD_STAMP

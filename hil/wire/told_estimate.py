@@ -5,9 +5,9 @@ from __future__ import annotations
 from estimation.tracking.estimate import Estimate, Joint
 from formation.kernel import kernel
 from formation.records import Buffer, Rows, write_float
+from hil.wire.assumed_errors import AssumedErrors, bounds_of
 from hil.wire.cdr import STAMP_BYTES, aligned
 from hil.wire.estimate_layout import COVARIANCE_AT, write_estimate
-from hil.wire.estimate_message import AssumedErrors, bounds_of
 from hil.wire.records import EstimateNumbers, Receipt
 
 _ROW_BYTES = 5 * 8

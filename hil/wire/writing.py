@@ -11,8 +11,8 @@ from estimation.tracking.estimate import Estimate
 from formation.pose import Motion
 from formation.records import Rows, columns_of, row_of, rows_of
 from hil.wire import entries
+from hil.wire.assumed_errors import AssumedErrors
 from hil.wire.cdr import packed_texts
-from hil.wire.estimate_message import AssumedErrors
 from hil.wire.message_types import Twist, TwistStamped
 from hil.wire.messages import typename_of
 from hil.wire.records import Receipt

@@ -18,7 +18,7 @@ from hil.recordings.csv_import import import_csv
 from hil.replay.calibration import calibrate
 from hil.replay.rerun import replay
 from hil.scenario.files import with_overrides
-from hil.wire.estimate_message import AssumedErrors
+from hil.wire.assumed_errors import AssumedErrors
 
 EXTENDED = ("v1_extended", "alpha1_extended", "h_extended")
 

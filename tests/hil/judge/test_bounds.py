@@ -11,7 +11,7 @@ from hil.judge.bounds import judge_bounds, worst_errors
 from hil.judge.columns import columns_of
 from hil.judge.evidence import Evidence
 from hil.scenario.certificate import certificate_of
-from hil.wire.estimate_message import AssumedErrors
+from hil.wire.assumed_errors import AssumedErrors
 
 NAN = math.nan
 

@@ -1,9 +1,8 @@
-"""Estimates to messages and back, with the error bounds that the scenario's assumptions give."""
+"""Error bounds that estimates go out with: what the scenario's assumptions give."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from estimation.bounds.error_bounds import InputErrors, Perceived, RateErrors
@@ -11,16 +10,12 @@ from estimation.bounds.guarantees import guaranteed_rate, leader_acceleration
 from estimation.bounds.live_bounds import ErrorBounds, LawConstants, Moment, MomentBounds, bounds_at
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.own_motion.steady_noise import steady_noise
-from estimation.tracking.estimate import Estimate, joint_of
-from estimation.tracking.track_point import NO_JUMP
-from estimation.tracking.tracker import Status
+from estimation.tracking.estimate import Estimate
 from formation.kernel import kernel
 from formation.spacing import Spacing
 from hil.scenario.leader_model import own_noise
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
-from hil.wire.message_types import Consumed, LeaderEstimate
-from hil.wire.messages import header, to_ns, to_time
 
 _SIGMAS = 3.0
 
@@ -143,59 +138,4 @@ def _with_jump(errors: ErrorBounds, estimate: Estimate, rho: float) -> ErrorBoun
         errors.E_alpha2 + turned + estimate.jump.heading,
         errors.E_v2,
         errors.E_u2,
-    )
-
-
-def to_message(
-    estimate: Estimate,
-    now_ns: int,
-    frame_id: str,
-    reason: str,
-    assumed: AssumedErrors,
-    receipts: Sequence[Consumed],
-) -> LeaderEstimate:
-    """Message of an estimate made at ``now_ns``, with its extended bounds."""
-    bound_v1, bound_alpha1, bound_h = bounds_of(estimate, assumed)
-    return LeaderEstimate(
-        header=header(estimate.capture_ns, frame_id),
-        measured=to_time(estimate.measured_ns),
-        computed=to_time(now_ns),
-        rho=estimate.rho,
-        alpha2=estimate.alpha2,
-        rho_dot=estimate.rho_dot,
-        alpha2_dot=estimate.alpha2_dot,
-        v1=estimate.v1,
-        alpha1=estimate.alpha1,
-        u1=estimate.u1,
-        v2=estimate.v2,
-        u2=estimate.u2,
-        covariance=estimate.covariance.reshape(25),
-        nis=estimate.nis,
-        status=int(estimate.status),
-        reason=reason,
-        bound_v1=bound_v1,
-        bound_alpha1=bound_alpha1,
-        bound_h=bound_h,
-        consumed=receipts,
-    )
-
-
-def from_message(message: LeaderEstimate) -> Estimate:
-    """Estimate that a message tells of; raises ValueError for a status that does not exist."""
-    return Estimate(
-        capture_ns=to_ns(message.header.stamp),
-        measured_ns=to_ns(message.measured),
-        rho=message.rho,
-        alpha2=message.alpha2,
-        rho_dot=message.rho_dot,
-        alpha2_dot=message.alpha2_dot,
-        v1=message.v1,
-        alpha1=message.alpha1,
-        u1=message.u1,
-        v2=message.v2,
-        u2=message.u2,
-        joint=joint_of(message.covariance.reshape(5, 5)),
-        nis=message.nis,
-        status=Status(message.status),
-        jump=NO_JUMP,
     )
