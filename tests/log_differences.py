@@ -40,15 +40,20 @@ def by_topic(records: Iterable[Record]) -> dict[str, list[Sent]]:
 
 
 def differences(
-    was: Mapping[str, Sequence[Sent]], now: Mapping[str, Sequence[Sent]], *, exactly: bool
+    was: Mapping[str, Sequence[Sent]],
+    now: Mapping[str, Sequence[Sent]],
+    *,
+    exactly: bool,
+    since_ns: int | None = None,
 ) -> list[str]:
     """A line for each topic whose messages differ, in the order of names; none if all are the same.
 
     ``exactly``: to the bit, else within :data:`TOLERANCE`, and then the digests in receipts may be any:
     they are those of payloads, which differ with the last bit of any number. Times in the lines [s] count
-    from the first message of ``was``.
+    from ``since_ns``, without it from the first message of ``was``.
     """
-    zero_ns = min((sent.at_ns for series in was.values() for sent in series), default=0)
+    first_ns = min((sent.at_ns for series in was.values() for sent in series), default=0)
+    zero_ns = first_ns if since_ns is None else since_ns
     lines = (
         _difference(name, was.get(name, ()), now.get(name, ()), zero_ns, exactly=exactly)
         for name in sorted(was.keys() | now.keys())
@@ -86,7 +91,7 @@ def _difference(topic: str, was: Sequence[Sent], now: Sequence[Sent], zero_ns: i
 
 
 def _distance(old: Sent, new: Sent) -> tuple[float, bool, bool]:
-    """Greatest difference of two numbers, whether any is beyond the tolerance, and whether else differs."""
+    """Greatest difference of two numbers, whether any is too great, and whether other things differ."""
     if old.typename != new.typename:
         return 0.0, False, True
     try:

@@ -9,9 +9,8 @@ from __future__ import annotations
 import json
 import platform
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import click
 from llvmlite import binding
@@ -78,7 +77,7 @@ def scenario_for(name: str) -> Scenario:
 
 
 def hardware() -> dict[str, str]:
-    """What the last bits of outputs depend on besides our code: processor, and libraries that calculate."""
+    """What the last bits of outputs depend on besides our code: processor and mathematical library."""
     return {
         "machine": platform.machine(),
         "cpu": _cpu_model(),
@@ -111,21 +110,14 @@ def replayed(log: Log, *, exactly: bool) -> list[str]:
     """How outputs of the nodes differ from those in a log when they are given the log's inputs again."""
     played = replay(log)
     names = topics_of(played.scenario)
-    outputs: dict[str, Iterable[Message]] = {
+    outputs: dict[str, Sequence[Message]] = {
         names.estimate: played.estimates,
         names.command: played.commands,
         names.certified: played.certified,
     }
     was = {topic: sent for topic, sent in _sent(log).items() if topic in outputs}
-    # A message that is put out has the place in time of the one that was.
-    now = {
-        topic: [
-            Sent(typename_of(message), encode(message), sent.at_ns)
-            for message, sent in zip(outputs[topic], series, strict=True)
-        ]
-        for topic, series in was.items()
-    }
-    lines = differences(was, now, exactly=exactly)
+    now = {topic: _in_place_of(series, outputs[topic]) for topic, series in was.items()}
+    lines = differences(was, now, exactly=exactly, since_ns=log.start_ns)
     if exactly and not lines and played.mismatched:
         lines = [why_not_same(log, played)]
     return lines
@@ -144,8 +136,18 @@ def renew() -> None:
             for line in lines:
                 click.echo(f"{name}: {line}")
             kept.write_bytes(new.read_bytes())
-    told: dict[str, Any] = {"abreast": __version__, **hardware()}
+    told = {"abreast": __version__, **hardware()}
     WRITTEN_ON.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+
+
+def _in_place_of(recorded: Sequence[Sent], outputs: Sequence[Message]) -> list[Sent]:
+    """Outputs of a replay, each at the time of the recorded one that it takes the place of."""
+    times = [sent.at_ns for sent in recorded]
+    times += [recorded[-1].at_ns] * (len(outputs) - len(recorded))
+    return [
+        Sent(typename_of(message), encode(message), at_ns)
+        for message, at_ns in zip(outputs, times, strict=False)
+    ]
 
 
 def _sent(log: Log) -> dict[str, list[Sent]]:
