@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from hil import __version__
 from hil.errors import UsageError
 from hil.judge.certified import certified_violations
 from hil.judge.evidence import Evidence, evidence_of_link, evidence_of_log
-from hil.log.metadata import IMPORT, mode_of
+from hil.log.metadata import IMPORT, mode_of, version_of
 from hil.log.reader import Log
 from hil.replay.journal import Parity
 from hil.replay.rerun import Replay
@@ -115,8 +116,20 @@ def why_not_same(log: Log, played: Replay) -> str:
     if gap_s > _LONG_GAP_S:
         # Whatever was consumed in the meantime, its receipts went by too.
         lost = lost or f"the log has nothing of {gap_s:.1f} s before: nobody can repeat what it misses"
+    reasons = [reason for reason in (lost, _other_version(log)) if reason]
     doubt = "did every daemon run with the recorder's scenario, and with this version of abreast?"
-    return f"log {log.path}: {', '.join(wrong)}; {lost or doubt}"
+    return f"log {log.path}: {', '.join(wrong)}; {'; '.join(reasons) or doubt}"
+
+
+def _other_version(log: Log) -> str:
+    """That a log was written by another version than this one; empty if it was not, or does not say."""
+    version = version_of(log)
+    if version is None or version == __version__:
+        return ""
+    return (
+        f"it was written by abreast {version} and this is {__version__}, which may calculate otherwise; "
+        f"verify it with abreast {version}"
+    )
 
 
 def violated_bounds(summary: Mapping[str, Any]) -> dict[str, int]:

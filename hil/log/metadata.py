@@ -53,6 +53,11 @@ def mode_of(log: Log) -> str | None:
     return log.metadata.get(RECORD, {}).get("mode")
 
 
+def version_of(log: Log) -> str | None:
+    """Version of abreast that wrote a log; None for a log that is not ours or does not say."""
+    return log.metadata.get(RECORD, {}).get("version")
+
+
 def certificate_metadata(certificate: Mapping[str, Any]) -> dict[str, dict[str, str]]:
     """Metadata record with a certificate, given as JSON of ``abreast bounds``."""
     return {CERTIFICATE: {"json": as_json(certificate)}}

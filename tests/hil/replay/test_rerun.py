@@ -1,11 +1,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from hil import __version__
 from hil.errors import UsageError
 from hil.judge.replay_verdict import why_not_same
 from hil.lockstep.lockstep import EPOCH_NS
@@ -256,3 +258,24 @@ def test_a_gap_in_the_log_is_told_where_it_is_why_outputs_differ(rough_log: Log,
 
     log = rewritten(rough_log, tmp_path / "gap.mcap", cut)
     assert "the log has nothing of 1.0 s before" in why_not_same(log, replay(log))
+
+
+def test_the_version_that_wrote_a_log_is_told_only_where_outputs_differ(
+    rough_log: Log, tmp_path: Path
+) -> None:
+    own = rough_log.metadata["abreast"]
+    older = replace(rough_log, metadata={**rough_log.metadata, "abreast": {**own, "version": "0.0.9"}})
+    kept = rewritten(older, tmp_path / "kept.mcap", lambda record: record)
+    assert why_not_same(kept, replay(kept)) == ""
+    older_says = f"it was written by abreast 0.0.9 and this is {__version__}"
+    for number, (log, topic, reasons) in enumerate(
+        [
+            (older, "follower/cmd_vel", [older_says]),
+            (older, "follower/leader_estimate", ["1 inputs are missing in the log", older_says]),
+            (rough_log, "follower/cmd_vel", ["and with this version of abreast?"]),
+        ]
+    ):
+        damaged = rewritten(log, tmp_path / f"{number}.mcap", nth(topic, 20, flipped(-48)))
+        said = why_not_same(damaged, replay(damaged))
+        assert all(reason in said for reason in reasons)
+        assert (older_says in said) == (log is older)
