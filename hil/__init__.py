@@ -1,3 +1,3 @@
 """Hardware in the loop: messages, emulator, daemons, logs, replay and the command line."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
