@@ -9,6 +9,7 @@ from typing import Any
 
 from hil import __version__
 from hil.errors import UsageError
+from hil.log.older_keys import with_older_keys
 from hil.log.reader import Log
 from hil.log.report_json import as_json
 from hil.scenario.files import build_scenario, scenario_text
@@ -34,7 +35,7 @@ def log_metadata(scenario: Scenario, mode: str) -> dict[str, dict[str, str]]:
 
 
 def scenario_of(log: Log) -> Scenario | None:
-    """Scenario that a log was made with; None for a log that is not ours.
+    """Scenario that a log was made with, as it meant then; None for a log that is not ours.
 
     Raises :class:`UsageError` if the log names one that this version cannot read.
     """
@@ -45,7 +46,7 @@ def scenario_of(log: Log) -> Scenario | None:
         tree = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise UsageError(f"log {log.path}: its scenario is not readable as TOML ({error})") from None
-    return build_scenario(tree, source=f"log {log.path}: scenario")
+    return build_scenario(with_older_keys(tree), source=f"log {log.path}: scenario")
 
 
 def mode_of(log: Log) -> str | None:

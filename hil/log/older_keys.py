@@ -1,0 +1,27 @@
+"""Keys of a scenario that are younger than logs may be: what they were before they were there.
+
+A log holds every key that there was when it was written. One that it lacks came later, and must mean to its
+replay what abreast did without it, whatever is today's default.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import deepcopy
+from typing import Any
+
+BEFORE: dict[str, Any] = {}
+"""Value of ``section.key`` for logs without it; a test asks for every key that a reference log lacks."""
+
+
+def with_older_keys(tree: Mapping[str, Any], before: Mapping[str, Any] = BEFORE) -> dict[str, Any]:
+    """The scenario of a log, with the keys that came later as they were before; others stay as they are.
+
+    >>> with_older_keys({"run": {"seed": 2}}, {"run.seed": 1, "run.pace": 1.0})
+    {'run': {'seed': 2, 'pace': 1.0}}
+    """
+    whole = deepcopy(dict(tree))
+    for name, value in before.items():
+        section, _, key = name.partition(".")
+        whole.setdefault(section, {}).setdefault(key, value)
+    return whole
