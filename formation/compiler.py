@@ -40,9 +40,9 @@ def type_of(kind: Any) -> Any:
         return types.Bytes(types.uint8, 1, "C", readonly=True)
     if get_origin(kind) is records.Rows:
         return types.Array(from_dtype(records.dtype_of(get_args(kind)[0])), 1, "C")
-    if dimensions := getattr(kind, "__metadata__", ()):
-        element = get_args(get_args(get_args(kind)[0])[1])[0]
-        return types.Array(_ELEMENTS[element], dimensions[0], "C")
+    if array := getattr(kind, "__metadata__", ()):
+        element, dimensions = array
+        return types.Array(_ELEMENTS[element], dimensions, "C")
     return record_type(kind)
 
 

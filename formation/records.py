@@ -18,16 +18,16 @@ from numpy.typing import NDArray
 
 R = TypeVar("R")
 
-Vector = Annotated[NDArray[np.float64], 1]
-Matrix = Annotated[NDArray[np.float64], 2]
-Tensor = Annotated[NDArray[np.float64], 3]
-Indices = Annotated[NDArray[np.int64], 1]
-IndexMatrix = Annotated[NDArray[np.int64], 2]
-IndexTensor = Annotated[NDArray[np.int64], 3]
-Flags = Annotated[NDArray[np.bool_], 1]
-FlagMatrix = Annotated[NDArray[np.bool_], 2]
-Buffer = Annotated[NDArray[np.uint8], 1]
-"""Arrays, contiguous in memory, as entries take them; the number counts their dimensions."""
+Vector = Annotated[NDArray[np.float64], np.float64, 1]
+Matrix = Annotated[NDArray[np.float64], np.float64, 2]
+Tensor = Annotated[NDArray[np.float64], np.float64, 3]
+Indices = Annotated[NDArray[np.int64], np.int64, 1]
+IndexMatrix = Annotated[NDArray[np.int64], np.int64, 2]
+IndexTensor = Annotated[NDArray[np.int64], np.int64, 3]
+Flags = Annotated[NDArray[np.bool_], np.bool_, 1]
+FlagMatrix = Annotated[NDArray[np.bool_], np.bool_, 2]
+Buffer = Annotated[NDArray[np.uint8], np.uint8, 1]
+"""Arrays, contiguous in memory, as entries take them; beside the type: element and number of dimensions."""
 
 _SCALARS: dict[Any, Any] = {float: np.float64, int: np.int64, bool: np.bool_}
 

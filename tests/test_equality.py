@@ -42,7 +42,8 @@ def held_types(record: type) -> list[Any]:
 
 def holds_array(kind: Any, within: tuple[type, ...] = ()) -> bool:
     """Whether a value of a type may hold an array, however deep."""
-    if np.ndarray in (kind, typing.get_origin(kind)):
+    # What NDArray[...] is depends on numpy's version.
+    if {np.ndarray, typing.get_origin(NDArray[Any])} & {kind, typing.get_origin(kind)}:
         return True
     if typing.get_origin(kind) is Callable:
         return False
