@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from formation.kernel import entry
-from formation.records import Buffer, Indices, Rows, Vector, borrowed, load, read_float, store
+from formation.records import Buffer, Indices, Rows, Vector, borrowed, load, read_float, store, write_float
 from hil.wire import command_layout, estimate_layout, frame_layout, odometry_layout
+from hil.wire.cdr import STAMP_BYTES, aligned, write_placement
 from hil.wire.message_checks import is_estimate
 from hil.wire.records import (
     Body,
@@ -23,7 +24,9 @@ def write_frame(
     buffer: Buffer, places_at: Indices, capture_ns: int, frame_number: int, bodies: Rows[Body]
 ) -> None:
     """Fill :func:`hil.wire.templates.frame_template`."""
-    frame_layout.write_frame(buffer, places_at, capture_ns, frame_number, borrowed(bodies))
+    frame_layout.write_frame_head(buffer, places_at, capture_ns, frame_number)
+    for k in range(len(places_at) - 1):
+        write_placement(buffer, places_at[k + 1], load(Body, borrowed(bodies), k).place)
 
 
 @entry
@@ -60,7 +63,9 @@ def write_estimate(
     receipts: Rows[Receipt],
 ) -> int:
     """Fill :func:`hil.wire.templates.estimate_template` from the first row; returns the length."""
-    estimate_layout.write_covariance(buffer, times_at, covariance)
+    at = aligned(times_at + 2 * STAMP_BYTES, 8) + estimate_layout.COVARIANCE_AT
+    for k in range(_COVARIANCE):
+        write_float(buffer, at + 8 * k, covariance[k])
     numbers = load(EstimateNumbers, borrowed(estimates), 0)
     return estimate_layout.write_estimate(buffer, times_at, reasons, numbers, borrowed(receipts))
 

@@ -75,11 +75,6 @@ class Estimate(NamedTuple):
         return matrix
 
 
-def joint_of(covariance: Matrix) -> Joint:
-    """Record of a covariance (5, 5) of :data:`QUANTITIES`."""
-    return Joint(*covariance[_ROWS, _COLUMNS].tolist())
-
-
 class Slope(NamedTuple):
     """Derivative of a quantity by the leader's position and velocity along the follower's axes."""
 

@@ -6,7 +6,6 @@ from formation.kernel import kernel
 from formation.records import (
     Buffer,
     Rows,
-    Vector,
     load,
     read_byte,
     read_float,
@@ -30,7 +29,7 @@ from hil.wire.cdr import (
     write_stamp,
     write_text,
 )
-from hil.wire.records import EstimateNumbers, ReadEstimate, Receipt, Stamp, is_time, ns_of
+from hil.wire.records import EstimateNumbers, ReadEstimate, Receipt, is_time, ns_of
 
 COVARIANCE_AT = 9 * 8
 """From rho to the covariance."""
@@ -87,12 +86,6 @@ def read_estimate(payload: bytes) -> ReadEstimate:
     return ReadEstimate(True, at + COVARIANCE_AT, receipts_at, numbers)
 
 
-@kernel
-def receipt_stamp(payload: bytes, receipts_at: int, k: int) -> Stamp:
-    """When the k-th input was taken in that an estimate or a command rests on."""
-    return read_stamp(payload, receipts_at + k * _RECEIPT_BYTES + 8)
-
-
 @kernel(inline=False)
 def write_estimate(
     buffer: Buffer, times_at: int, reasons: bytes, numbers: EstimateNumbers, receipts: Rows[Receipt]
@@ -122,14 +115,6 @@ def write_estimate(
     write_float(buffer, at + 8, n.bound_alpha1)
     write_float(buffer, at + 16, n.bound_h)
     return write_receipts(buffer, at + _BOUNDS_BYTES, receipts, n.consumed)
-
-
-@kernel
-def write_covariance(buffer: Buffer, times_at: int, covariance: Vector) -> None:
-    """Put the covariance, 25 numbers row by row, into an estimate."""
-    at = aligned(times_at + 2 * STAMP_BYTES, 8) + COVARIANCE_AT
-    for k in range(_ELEMENTS):
-        write_float(buffer, at + 8 * k, covariance[k])
 
 
 @kernel

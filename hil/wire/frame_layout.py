@@ -16,7 +16,6 @@ from hil.wire.cdr import (
     read_placement,
     read_stamp,
     text_number,
-    write_placement,
     write_stamp,
 )
 from hil.wire.records import Body, FrameHead, Placement, Stamp
@@ -75,21 +74,11 @@ def _after_markers(payload: bytes, at: int) -> int:
 
 
 @kernel
-def write_frame(
-    buffer: Buffer, places_at: Indices, capture_ns: int, frame_number: int, bodies: Rows[Body]
-) -> None:
-    """Put stamp, number and poses into a frame whose names stand there already.
+def write_frame_head(buffer: Buffer, places_at: Indices, capture_ns: int, frame_number: int) -> None:
+    """Put stamp and number into a frame whose names stand there already, and whose poses are still to come.
 
     ``places_at``: position of the frame number, then of each body's pose, as
     :func:`hil.wire.templates.frame_template` has them.
     """
-    write_frame_head(buffer, places_at, capture_ns, frame_number)
-    for k in range(size(bodies)):
-        write_placement(buffer, places_at[k + 1], load(Body, bodies, k).place)
-
-
-@kernel
-def write_frame_head(buffer: Buffer, places_at: Indices, capture_ns: int, frame_number: int) -> None:
-    """Put stamp and number into a frame, whose poses are still to come."""
     write_stamp(buffer, HEAD_BYTES, capture_ns)
     write_int32(buffer, places_at[0], frame_number)

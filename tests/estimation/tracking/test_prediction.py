@@ -13,7 +13,7 @@ from estimation.filters.belief import Model
 from estimation.filters.estimators import make_estimator
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, PoseNoise, measure_body_from_mocap, measure_world
-from estimation.tracking.estimate import Estimate, estimate_of, joint_of
+from estimation.tracking.estimate import Estimate, Joint, estimate_of
 from estimation.tracking.foresight import NO_TREND, Foresight, TurnTrend
 from estimation.tracking.prediction import (
     Reported,
@@ -52,7 +52,7 @@ def estimate(v2: float = 0.1, u2: float = 0.4, alpha2: float = 1.2) -> Estimate:
         u1=0.6,
         v2=v2,
         u2=u2,
-        joint=joint_of(np.eye(5)),
+        joint=Joint(*np.eye(5)[np.triu_indices(5)].tolist()),
         nis=1.0,
         status=Status.TRACKING,
         jump=NO_JUMP,
