@@ -21,7 +21,10 @@ from hil.sweep.spec import Sweep, load_sweep
 @click.option("--runs", type=click.IntRange(min=1), metavar="N", help="Runs of every cell.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all noise.")
 @click.option("--duration", type=Seconds(1.0), metavar="S", help="Seconds of every run.")
-@click.option("--estimators", metavar="A,B", help="Estimators, of ekf, ukf and difference.")
+@click.option("--estimators", metavar="A,B", help="Estimators, any that a scenario takes.")
+@click.option(
+    "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key in all cells."
+)
 @click.option(
     "--workers", type=click.IntRange(min=1), metavar="N", help="Processes [as many as there are processors]."
 )
@@ -45,6 +48,7 @@ def command(
     seed: int | None,
     duration: float | None,
     estimators: str | None,
+    overrides: tuple[str, ...],
     workers: int | None,
     scheduler: str | None,
     kept: tuple[str, ...],
@@ -59,7 +63,7 @@ def command(
     from hil.sweep.results import write_results
 
     names = None if estimators is None else [name.strip() for name in estimators.split(",")]
-    sweep = load_sweep(spec, runs=runs, seed=seed, duration_s=duration, estimators=names)
+    sweep = load_sweep(spec, overrides, runs=runs, seed=seed, duration_s=duration, estimators=names)
     to_keep = [_parsed(sweep, text) for text in kept if text != "worst"]
     folder = out or Path("runs") / f"sweep-{time.strftime('%Y%m%d-%H%M%S')}"
     result = _fly(sweep, folder, workers or len(os.sched_getaffinity(0)), scheduler)

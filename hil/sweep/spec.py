@@ -14,6 +14,7 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from estimation.filters.estimators import ESTIMATORS
+from hil import __version__
 from hil.errors import UsageError
 from hil.scenario.checked_toml import checked, locate, read_toml
 from hil.scenario.files import load_scenario, with_overrides
@@ -96,13 +97,16 @@ class Sweep:
         return with_overrides(self.scenario, [*cell.overrides(), f"run.seed={seed}"])
 
     def digest(self) -> str:
-        """What tells this sweep from any other: a hash of all that its results depend on."""
-        told = msgspec.json.encode([msgspec.structs.replace(self.spec, description=""), self.scenario])
+        """What tells this sweep from any other: a hash of all that its results depend on, our version too."""
+        spec = msgspec.structs.replace(self.spec, description="")
+        told = msgspec.json.encode([__version__, spec, self.scenario])
         return hashlib.sha256(told).hexdigest()
 
 
-def load_sweep(name_or_path: str, **changes: Any) -> Sweep:
+def load_sweep(name_or_path: str, overrides: Sequence[str] = (), **changes: Any) -> Sweep:
     """Read a specification by its shipped name or from a TOML file; ``changes`` other than None override it.
+
+    ``overrides`` of the scenario's keys come after those of the specification, and before those of the cells.
 
     Raises :class:`UsageError` for whatever is wrong in it, in its scenario, or in any of its cells.
     """
@@ -110,6 +114,7 @@ def load_sweep(name_or_path: str, **changes: Any) -> Sweep:
     tree = read_toml(path, "sweep")
     tree |= {key: value for key, value in changes.items() if value is not None}
     spec = checked(tree, SweepSpec, f"sweep {path.stem}")
+    spec = msgspec.structs.replace(spec, set=(*spec.set, *overrides))
     for estimator in spec.estimators:
         if estimator not in ESTIMATORS:
             raise UsageError(

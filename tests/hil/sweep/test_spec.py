@@ -56,6 +56,23 @@ def test_a_mistake_is_answered_by_one_line(make_sweep: Callable[..., Sweep], tex
     assert "\n" not in str(caught.value)
 
 
-def test_sweeps_differ_by_their_digests(make_sweep: Callable[..., Sweep]) -> None:
-    assert make_sweep().digest() == make_sweep().digest()
-    assert make_sweep().digest() != make_sweep(seed=9).digest()
+def test_sweeps_differ_by_their_digests(
+    make_sweep: Callable[..., Sweep], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    digest = make_sweep().digest()
+    assert digest == make_sweep().digest()
+    assert digest != make_sweep(seed=9).digest()
+    # Another version may calculate otherwise: its runs are not gone on with.
+    monkeypatch.setattr("hil.sweep.spec.__version__", "0.0.9")
+    assert digest != make_sweep().digest()
+
+
+def test_overrides_are_those_of_all_cells() -> None:
+    sweep = load_sweep("default", ["mocap.jitter_s=0.004", "run.duration_s=7"], runs=1)
+    for cell in sweep.cells()[:3]:
+        scenario = sweep.scenario_of(cell)
+        assert scenario.mocap.jitter_s == 0.004
+        # What the sweep itself says has the last word.
+        assert scenario.run.duration_s == sweep.spec.duration_s
+    with pytest.raises(UsageError, match=r"estimator\.certify is True, but a sweep takes false"):
+        load_sweep("default", ["estimator.certify=true"])
