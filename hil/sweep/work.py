@@ -88,7 +88,8 @@ class Store:
                 os.replace(unfinished, mark)
             elif mark.read_text() != sweep.digest():
                 raise UsageError(
-                    f"--out {folder}: holds another sweep, or one of another version of abreast; give another folder, or remove it"
+                    f"--out {folder}: holds another sweep, or one of another version of abreast; "
+                    "give another folder, or remove it"
                 )
         except OSError as error:
             raise UsageError(f"--out {folder}: cannot be used ({error.strerror}); give another") from None
