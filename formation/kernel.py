@@ -18,9 +18,9 @@ import functools
 import importlib.util
 import os
 from collections.abc import Callable
-from typing import Any, TypeVar, overload
+from typing import Any, TypeVar, cast, overload
 
-from formation.marked import MARKED, Marked
+from formation.marked import MARKED, PLAIN, Marked
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -54,7 +54,8 @@ def entry(function: F) -> F:
 
     It takes and returns ``int``, ``float``, ``bool``, ``bytes``, named tuples of these,
     :class:`formation.records.Rows` of named tuples, and the arrays named there. Its module must be loaded as
-    far as its annotations need, so that entries stand below the kernels that they call.
+    far as its annotations need, so that entries stand below the kernels that they call. Arguments go by
+    position; that rows are of the type that is annotated is left to mypy, nothing looks at it again here.
     """
     if not compiles():
         return function
@@ -66,8 +67,8 @@ def entry(function: F) -> F:
 
 def interpreted(function: F) -> F:
     """The plain Python function behind an entry."""
-    plain: F = getattr(function, "py_func", function)
-    return plain
+    plain: Any = PLAIN.get(function, function)
+    return cast("F", plain)
 
 
 @functools.cache

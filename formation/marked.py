@@ -1,4 +1,4 @@
-"""The kernels there are: what ``@kernel`` has marked, for the compiler to learn."""
+"""The kernels there are, for the compiler to learn, and the plain functions behind what it has compiled."""
 
 from __future__ import annotations
 
@@ -15,3 +15,6 @@ class Marked(NamedTuple):
 
 MARKED: list[Marked] = []
 """All kernels so far, in the order of their definition."""
+
+PLAIN: dict[Callable[..., Any], Callable[..., Any]] = {}
+"""The plain Python function behind each compiled entry."""

@@ -145,12 +145,13 @@ def weighed(x: float) -> float:
     return WEIGHT * x
 """
 TOP = """from __future__ import annotations
+from formation.compiler import DISPATCHERS
 from formation.kernel import entry
 from formation.leaf_of_a_test import weighed
 @entry
 def answer(x: float) -> float:
     return weighed(x)
-print(answer(2.0), sum(answer.stats.cache_hits.values()))
+print(answer(2.0), sum(DISPATCHERS[answer].stats.cache_hits.values()))
 """
 
 
@@ -195,12 +196,13 @@ def made(x: float) -> {name}:
     return {name}(x, 2)
 """
 RECORD_TOP = """from __future__ import annotations
+from formation.compiler import DISPATCHERS
 from formation.kernel import entry
 from formation.leaf_of_a_test import Record, made
 @entry
 def answer(x: float) -> Record:
     return made(x)
-print(answer(2.0), sum(answer.stats.cache_hits.values()))
+print(answer(2.0), sum(DISPATCHERS[answer].stats.cache_hits.values()))
 """
 
 
