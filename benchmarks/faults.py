@@ -37,10 +37,11 @@ from estimation.tracking.track_point import GATED, NO_JUMP
 from estimation.tracking.tracker import Status
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
+from formation.records import load, store
 from formation.shape import Shape, follower_pose, shape_of, shape_rates
 from hil.emulator.faults import Pair, fault_rows, faulty
 from hil.nodes.estimator import EstimatorNode
-from hil.nodes.estimator_memory import EstimatorMemory
+from hil.nodes.estimator_desk import Shown
 from hil.scenario.files import load_scenario
 from hil.scenario.parts import gains, leader_program
 from hil.scenario.schema import FaultSection, Scenario
@@ -156,26 +157,27 @@ def inject(
     stays = fault is not None and fault.duration_s == STAYS
     at = settling if fault is None else fault.at_s
     end = at if fault is None or stays else at + max(fault.duration_s, PERIOD)
-    doubted = end + node.rules.settings.doubt_for
+    doubted = end + node.rules.step.settings.doubt_for
     until = doubted + 1.0 if stays else end + after
-    memory = EstimatorMemory(node.rules)
+    memory = node.begin(0).memory
     last: Pair | None = None
     back = math.inf
     for k, moment in enumerate(drive(node.scenario, generator, math.ceil(until / PERIOD))):
         t, capture_ns = k * PERIOD, (k + 120) * PERIOD_NS
         for sample in moment.heard:
-            memory.take_odometry(sample)
+            store(memory.desk.sample, 0, sample)
+            memory.take_odometry()
         faults = fault_rows([] if fault is None else [fault])
         frame = faulty(faults, t, PERIOD, moment.shown, last or moment.shown)
         if frame.lost:
             continue
         last = shown = frame.pair
         seen = PairSeen(shown.leader.x, shown.leader.y, shown.follower)
-        outcome, told = memory.take_frame(capture_ns, seen), memory.estimate(capture_ns)
-        assert told is not None
-        found = told.estimate
+        store(memory.desk.shown, 0, Shown(capture_ns, seen))
+        memory.take_frame(capture_ns)
+        found, verdict = load(Estimate, memory.desk.newest, 0), memory.notes.verdict
         score.frames += 1
-        score.rejected += outcome.verdict == GATED
+        score.rejected += verdict == GATED
         if t < settling or found.status != Status.TRACKING:
             continue
         if t >= end - 1e-9:
@@ -185,7 +187,7 @@ def inject(
             pair = faulty(fault_rows([fault]), t, PERIOD, pair, pair).pair
         errors = errors_of(found, pair, moment.leader, moment.follower)
         sd = np.sqrt(np.diagonal(found.covariance)).tolist()
-        bound_v1, bound_alpha1, _ = bounds_of(found, node.assumed)
+        bound_v1, bound_alpha1, _ = bounds_of(found, node.rules.assumed)
         score.tracking += 1
         score.beyond_sigma += any(e > 5.0 * s for e, s in zip(errors.values(), sd, strict=False))
         score.beyond_bound += errors["v1"] > bound_v1 or errors["alpha1"] > bound_alpha1

@@ -26,8 +26,9 @@ def record_type(kind: Any) -> Any:
         return _SCALARS[kind]
     if not records.is_record(kind):
         raise TypeError(f"compiled code cannot take {kind}, expected a number or a named tuple of such")
-    hints = get_type_hints(kind)
-    parts = [record_type(hints[name]) for name in records.fields_of(kind)]
+    hints = get_type_hints(kind, include_extras=True)
+    held = [hints[name] for name in records.fields_of(kind)]
+    parts = [record_type(records.Span if records.is_lent(hint) else hint) for hint in held]
     if all(part == parts[0] for part in parts):
         return types.NamedUniTuple(parts[0], len(parts), kind)
     return types.NamedTuple(parts, kind)
@@ -125,6 +126,8 @@ def _teach_rows() -> None:
 
 
 def _bytes_base(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    if isinstance(kind, types.BaseNamedTuple):
+        return builder.extract_value(value, 0)
     return builder.ptrtoint(context.make_array(kind)(context, builder, value).data, _WORD)
 
 

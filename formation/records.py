@@ -11,7 +11,17 @@ from __future__ import annotations
 import functools
 import struct
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Any, Generic, NamedTuple, TypeVar, cast, get_type_hints
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Generic,
+    NamedTuple,
+    TypeVar,
+    cast,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,17 +62,25 @@ def is_record(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
 
 
+def is_lent(hint: Any) -> bool:
+    """Whether the type of a field is that of rows or of an array."""
+    return get_origin(hint) is Rows or bool(getattr(hint, "__metadata__", ()))
+
+
 @functools.cache
 def dtype_of(kind: Any) -> np.dtype[np.void]:
     """Aligned structured dtype of a named tuple of ``float``, ``int``, ``bool`` and named tuples of these.
 
-    Raises :class:`TypeError` for a field of another type.
+    Rows and arrays that it lends stand there as :class:`Span`. Raises :class:`TypeError` for a field of
+    another type.
     """
-    hints = get_type_hints(kind)
+    hints = get_type_hints(kind, include_extras=True)
     fields: list[tuple[str, Any]] = []
     for name in fields_of(kind):
         hint = hints[name]
-        if is_record(hint):
+        if is_lent(hint):
+            fields.append((name, dtype_of(Span)))
+        elif is_record(hint):
             fields.append((name, dtype_of(hint)))
         elif hint in _SCALARS:
             fields.append((name, _SCALARS[hint]))
@@ -91,11 +109,33 @@ def rows_of(kind: type[R], count: int) -> Rows[R]:
     return cast("Rows[R]", np.zeros(count, dtype_of(cast("Any", kind))))
 
 
+def plain_rows_of(kind: type[R], count: int) -> Rows[R]:
+    """New rows for plain Python alone, faster there than an array; none may be loaded before it is stored."""
+    return cast("Rows[R]", [None] * count)
+
+
 def row_of(record: R) -> Rows[R]:
     """One new row that holds a named tuple."""
     rows = rows_of(type(record), 1)
     store(rows, 0, record)
     return rows
+
+
+def lent(record: R) -> Rows[R]:
+    """One row that holds a named tuple of rows and arrays by where these lie, for an entry to work in all.
+
+    The row keeps none of them alive: whoever made them holds on to ``record`` as long. In plain Python a
+    list of the record itself does as well.
+    """
+    rows = rows_of(type(record), 1)
+    columns_of(rows)[0] = _spans(record)
+    return rows
+
+
+def _spans(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.__array_interface__["data"][0], len(value)
+    return tuple(map(_spans, value)) if isinstance(value, tuple) else value
 
 
 def copy_of(rows: Rows[R]) -> Rows[R]:

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from estimation.time.clock import NOTHING_HEARD, SLOT_NS, SPAN_NS, Arrival, Line, heard, jitter_of, lower_line
+from estimation.time.clock import (
+    NOTHING_HEARD,
+    SLOT_NS,
+    SPAN_NS,
+    arrivals_in,
+    clock_rows,
+    heard,
+    jitter_of,
+)
+from estimation.time.delay_line import Arrival, Line, lower_line
+from formation.records import plain_rows_of
 
 
 def judge_clock(arrivals: Sequence[Arrival]) -> dict[str, object]:
@@ -16,14 +26,14 @@ def judge_clock(arrivals: Sequence[Arrival]) -> dict[str, object]:
     each minute. ``jumps``: of more than 50 ms. Empty for logs whose frames were received as they were
     captured: these are recordings that do not tell.
     """
-    if not any(each.delay_ns for each in arrivals):
+    if not any(each.delay() for each in arrivals):
         return {}
     epochs: list[list[Arrival]] = [[]]
-    clock = NOTHING_HEARD
+    clock, rows = NOTHING_HEARD, clock_rows(plain_rows_of)
     for arrival in arrivals:
-        before, clock = clock, heard(clock, arrival)
+        before, clock = clock, heard(clock, rows, arrival)
         if clock.jumps > before.jumps:
-            epochs.append(list(clock.recent))
+            epochs.append(arrivals_in(rows.recent, clock.recent))
         elif not clock.suspects:
             epochs[-1].append(arrival)
     above: list[float] = []
@@ -52,6 +62,6 @@ def _line(part: Sequence[Arrival]) -> Line:
     lowest: dict[int, Arrival] = {}
     for each in part:
         slot = each.capture_ns // SLOT_NS
-        if slot not in lowest or each.delay_ns < lowest[slot].delay_ns:
+        if slot not in lowest or each.delay() < lowest[slot].delay():
             lowest[slot] = each
-    return lower_line([(lowest[slot].capture_ns, lowest[slot].delay_ns) for slot in sorted(lowest)])
+    return lower_line([(lowest[slot].capture_ns, lowest[slot].delay()) for slot in sorted(lowest)])

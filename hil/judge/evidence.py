@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, TypeVar
 
-from estimation.time.clock import Arrival
+from estimation.time.delay_line import Arrival
 from hil.errors import UsageError
 from hil.judge.side_orders import Order, orders_of
 from hil.judge.sound_messages import is_sound

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
-from msgspec import Struct, field
-from msgspec.structs import replace
-
-from controllers.guard import CLOCK_TOLERANCE_NS
-from estimation.models.coordinated_turn import FollowerMotion
-from estimation.models.measurement import FrontEnd, PairSeen, from_sensor, measure_body
 from estimation.own_motion.odometry_correction import (
     NOTHING_SEEN,
     OdometryWatch,
@@ -18,82 +12,76 @@ from estimation.own_motion.odometry_correction import (
     with_pose,
     with_sample,
 )
-from estimation.own_motion.odometry_history import IDEAL
 from estimation.time.host_time import HostTime
 from estimation.tracking.estimate import Estimate
-from estimation.tracking.follower_check import Cause
-from estimation.tracking.track_point import DUPLICATE, GATED, LATE, Verdict
-from estimation.tracking.tracker import Status
-from formation.angles import wrap
-from formation.records import columns_of, load
+from estimation.tracking.track_point import DUPLICATE, GATED, LATE
+from formation.records import load
 from hil.nodes.certifying import Believed, certifying
-from hil.nodes.estimator_memory import EstimatorMemory, rules_of
-from hil.nodes.estimator_step import Outcome
-from hil.nodes.frame_time import FrameTime
-from hil.nodes.node import (
-    Counts,
-    Outgoing,
-    consumed,
-    counted,
-    diagnostics,
-    is_due,
-    named_counts,
-    no_counts,
-    outgoing,
-)
+from hil.nodes.estimator_entries import RESTARTED, SEEN, SET_BACK, TICK_NS
+from hil.nodes.estimator_memory import EstimatorMemory, node_rules
+from hil.nodes.frame_time import clock_report
+from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
 from hil.nodes.sensor_offsets import offsets_report
-from hil.nodes.status_reasons import ALL_REASONS, reason_number
 from hil.scenario.files import refuse_unrunnable
 from hil.scenario.schema import Scenario
 from hil.wire import topics
-from hil.wire.assumed_errors import AssumedErrors
 from hil.wire.certified_message import certified_message
 from hil.wire.events import Event
 from hil.wire.message_types import LeaderEstimate
 from hil.wire.messages import typename_of
-from hil.wire.reading import RefusedError, read_frame, read_odometry, read_sighting
+from hil.wire.reading import frame_reader
 from hil.wire.records import Receipt
+from hil.wire.templates import estimate_template
 from hil.wire.topics import topics_of
-from hil.wire.writing import MOST_RECEIPTS, EstimateWriter
+from hil.wire.writing import MOST_RECEIPTS
 
 NAME = "estimator"
-_TICK_NS = 50_000_000
 _DIAGNOSTICS_NS = 500_000_000
-_SAME_PLACE = 1e-3  # two robots whose centres are this close [m] are one body under two names
 _ESTIMATE = typename_of(LeaderEstimate)
 _UNUSED = (GATED, DUPLICATE, LATE)
-_UNKNOWN_MOTION = FollowerMotion(0.0, 0.0, 0.0, 0.0)
 
 
-class EstimatorState(Struct, frozen=True):
-    """All that the estimator remembers.
+@dataclass(slots=True, eq=False)
+class EstimatorState:
+    """All that the estimator remembers; it changes in place.
 
-    ``memory``: of leader and follower, changed in place by whoever has the newest state. ``watch``: how
-    odometry compares with mocap. ``times``: what is known of the clock that frames are stamped by.
-    ``believed``: what certificates rest on, if any are asked for. ``receipts``: inputs since the last
-    estimate. ``refused``: inputs that were not used, by cause. ``taken``: inputs that were used, by kind.
-    ``heard_ns``: when the newest input came.
+    ``memory``: tracks, clock, receipts and counts, in rows. ``watch``: how odometry compares with mocap.
+    ``believed``: what certificates rest on, if any are asked for.
     """
 
     memory: EstimatorMemory
     watch: OdometryWatch = NOTHING_SEEN
-    times: HostTime = HostTime()
-    believed: Believed = Believed()
-    receipts: tuple[Receipt, ...] = ()
-    refused: Counts = field(default_factory=no_counts)
-    taken: Counts = field(default_factory=no_counts)
+    believed: Believed = field(default_factory=Believed)
     next_tick_ns: int = 0
     next_diagnostics_ns: int = 0
-    last_out_ns: int = 0
-    heard_ns: int = 0
 
     def copy(self) -> EstimatorState:
-        """The same state with a memory of its own: a step changes that of the state it is given."""
+        """The same state, to go on from twice."""
         return replace(self, memory=self.memory.copy())
+
+    @property
+    def times(self) -> HostTime:
+        """What is known of the clock that frames are stamped by."""
+        return self.memory.notes.times
+
+    @property
+    def receipts(self) -> tuple[Receipt, ...]:
+        """Inputs since the last estimate."""
+        return self.memory.receipts
+
+    @property
+    def taken(self) -> Counts:
+        """Inputs that were used, by kind."""
+        return self.memory.counts()[0]
+
+    @property
+    def refused(self) -> Counts:
+        """Inputs that were not used, by cause."""
+        return self.memory.counts()[1]
 
 
 class EstimatorNode:
-    """Pure step of the estimator of one follower. Raises :class:`UsageError` for one that is not live.
+    """Step of the estimator of one follower. Raises :class:`UsageError` for one that is not live.
 
     ``others``: names of further robots that the motion capture shows.
     """
@@ -102,18 +90,16 @@ class EstimatorNode:
         refuse_unrunnable(scenario)
         given = scenario.estimator
         self.name = name
-        self.others = others
         self.scenario = scenario
         self.topics = topics_of(scenario)
-        self.front_end = FrontEnd(given.front_end)
-        self.rules = rules_of(scenario)
-        EstimatorMemory(self.rules)  # now, and not with the first message, all is compiled or loaded
+        leader, follower = self.topics.leader, self.topics.follower
+        self._reader = frame_reader(others | {leader, follower})
+        self._wanted = self._reader.pair(leader, follower)
+        self._template = estimate_template(follower, MOST_RECEIPTS)
+        self.rules = node_rules(scenario, self._template.numbers_at)
         self.aligns = given.align_odometry and given.own_motion != "mocap"
-        self.assumed = AssumedErrors.of(scenario)
-        self.writer = EstimateWriter(self.topics.follower, self.assumed, ALL_REASONS)
-        self.frame_time = FrameTime(scenario)
         self.certifying = certifying(scenario)
-        self._handlers: dict[str, Callable[[EstimatorState, bytes, int], tuple[EstimatorState, bool]]] = {
+        self._handlers: dict[str, Callable[[EstimatorState, Event, int], int]] = {
             topics.RIGID_BODIES: self._on_frame,
             self.topics.odom: self._on_odometry,
             self.topics.sighting: self._on_sighting,
@@ -122,7 +108,8 @@ class EstimatorNode:
 
     def begin(self, now_ns: int) -> EstimatorState:
         """State of an estimator that has seen nothing."""
-        return EstimatorState(EstimatorMemory(self.rules), next_tick_ns=now_ns, next_diagnostics_ns=now_ns)
+        memory = EstimatorMemory(self.rules, self._reader, self._wanted, self._template)
+        return EstimatorState(memory, next_tick_ns=now_ns, next_diagnostics_ns=now_ns)
 
     def due_ns(self, state: EstimatorState) -> int:
         """Time of the next tick."""
@@ -133,117 +120,77 @@ class EstimatorNode:
     ) -> tuple[EstimatorState, tuple[Outgoing, ...]]:
         """Take in a frame, a sighting, odometry, or a tick; every new measurement gives an estimate."""
         if not event.topic:
-            return self._tick(state, now_ns)
+            return state, self._tick(state, now_ns)
         handler = self._handlers.get(event.topic)
-        if handler is None:
-            return state, ()
-        if now_ns < state.heard_ns - CLOCK_TOLERANCE_NS:
-            # The clock was set back: all that comes would be too late for what was heard before.
-            state = self._forgotten(state)
-        receipts = (*state.receipts, consumed(event, now_ns))[-MOST_RECEIPTS:]
-        state = replace(state, receipts=receipts, heard_ns=now_ns)
-        try:
-            state, is_new = handler(state, event.payload, now_ns)
-        except RefusedError as refusal:
-            return replace(state, refused=counted(state.refused, refusal.cause)), ()
-        return self._publish(state, now_ns) if is_new else (state, ())
+        length = handler(state, event, now_ns) if handler is not None else 0
+        return state, self._told(state, length, now_ns) if length else ()
 
-    def _forgotten(self, state: EstimatorState) -> EstimatorState:
-        state.memory.forget()
-        state.memory.correct(IDEAL)
-        return replace(state, watch=NOTHING_SEEN, believed=Believed())
-
-    def _on_frame(self, state: EstimatorState, payload: bytes, now_ns: int) -> tuple[EstimatorState, bool]:
-        frame = read_frame(payload, self.topics.leader, self.topics.follower, others=self.others)
-        timed = self.frame_time.of(state.times, frame, now_ns)
-        state = replace(state, times=timed.times)
-        if timed.refusal:
-            return replace(state, refused=counted(state.refused, timed.refusal)), False
-        if timed.restart:
-            state.memory.forget_tracks()
-            state = replace(state, believed=Believed())
-        capture_ns = timed.capture_ns
-        state = replace(state, taken=counted(state.taken, "frames"))
-        if frame.strangers:
-            state = replace(state, refused=counted(state.refused, "unknown_body"))
-        leader, follower = frame.leader, frame.follower
-        if math.dist(leader, (follower.x, follower.y)) < _SAME_PLACE:
-            raise RefusedError("same_place")
+    def _on_frame(self, state: EstimatorState, event: Event, now_ns: int) -> int:
+        memory = state.memory
+        came = memory.see_frame(event.payload, event.signed_digest, now_ns)
+        if came != SEEN and not self._is_seen(state, came):
+            return 0
         if self.aligns:
-            watch = reconsidered(with_pose(state.watch, capture_ns, follower), now_ns)
-            state.memory.correct(watch.applied)
-            state = replace(state, watch=watch)
-        outcome = state.memory.take_frame(capture_ns, PairSeen(*leader, follower))
-        state, is_new = self._counted(state, outcome)
-        if outcome.verdict not in _UNUSED and self.certifying is not None:
-            believed = self.certifying.heard_frame(state.believed, capture_ns, leader, follower)
-            state = replace(state, believed=believed)
-        return state, is_new
+            shown = memory.shown
+            watch = reconsidered(with_pose(state.watch, shown.capture_ns, shown.seen.follower), now_ns)
+            memory.correct(watch.applied)
+            state.watch = watch
+        length = memory.take_frame(now_ns)
+        if self.certifying is not None and memory.notes.verdict not in _UNUSED:
+            capture_ns, seen = memory.shown
+            leader = (seen.leader_x, seen.leader_y)
+            state.believed = self.certifying.heard_frame(state.believed, capture_ns, leader, seen.follower)
+        return length
 
-    def _on_sighting(self, state: EstimatorState, payload: bytes, now_ns: int) -> tuple[EstimatorState, bool]:
-        if self.front_end is FrontEnd.WORLD:
-            raise RefusedError("sighting_without_body_front_end")
-        sighting = read_sighting(payload, now_ns)
-        state = replace(state, taken=counted(state.taken, "frames"))
-        given, capture_ns = self.scenario.estimator, sighting.capture_ns
-        rho, alpha2 = sighting.rho - given.range_bias, float(wrap(sighting.alpha2 - given.bearing_bias))
-        if rho <= 0.0:
-            raise RefusedError("bad_range")
-        if given.sensor_x or given.sensor_y:
-            rho, alpha2 = from_sensor(rho, alpha2, (given.sensor_x, given.sensor_y))
-        if rho < _SAME_PLACE:
-            raise RefusedError("same_place")
-        noise = (given.sigma_range, given.sigma_bearing)
-        outcome = state.memory.take_sighting(measure_body(capture_ns, rho, alpha2, *noise, _UNKNOWN_MOTION))
-        state, is_new = self._counted(state, outcome)
-        if outcome.verdict not in _UNUSED and self.certifying is not None:
-            believed = self.certifying.heard_sighting(state.believed, capture_ns, rho, alpha2)
-            state = replace(state, believed=believed)
-        return state, is_new
+    def _on_sighting(self, state: EstimatorState, event: Event, now_ns: int) -> int:
+        memory = state.memory
+        came = memory.see_sighting(event.payload, event.signed_digest, now_ns)
+        if came != SEEN and not self._is_seen(state, came):
+            return 0
+        length = memory.take_sighting(now_ns)
+        if self.certifying is not None and memory.notes.verdict not in _UNUSED:
+            _, capture_ns, rho, alpha2 = memory.sighting
+            state.believed = self.certifying.heard_sighting(state.believed, capture_ns, rho, alpha2)
+        return length
 
-    def _on_odometry(self, state: EstimatorState, payload: bytes, now_ns: int) -> tuple[EstimatorState, bool]:
-        sample = read_odometry(payload, now_ns)
+    def _on_odometry(self, state: EstimatorState, event: Event, now_ns: int) -> int:
+        memory = state.memory
+        came = memory.see_odometry(event.payload, event.signed_digest, now_ns)
+        if came != SEEN and not self._is_seen(state, came):
+            return 0
         if self.aligns:
-            state = replace(state, watch=with_sample(state.watch, sample))
-        state.memory.take_odometry(sample)
-        return replace(state, taken=counted(state.taken, "odometry")), False
+            state.watch = with_sample(state.watch, memory.sample)
+        memory.take_odometry()
+        return 0
 
-    def _counted(self, state: EstimatorState, outcome: Outcome) -> tuple[EstimatorState, bool]:
-        """State with an outcome counted, and whether the track has moved on."""
-        verdict, cause = Verdict(outcome.verdict), Cause(outcome.cause)
-        if verdict in _UNUSED:
-            state = replace(state, refused=counted(state.refused, cause.word or verdict.word))
-        else:
-            state = replace(state, taken=counted(state.taken, "used"))
-        if outcome.late and verdict is not Verdict.DUPLICATE:
-            state = replace(state, taken=counted(state.taken, "late"))
-        return state, verdict not in (Verdict.DUPLICATE, Verdict.LATE)
+    def _is_seen(self, state: EstimatorState, came: int) -> bool:
+        """Whether an input can be used that may not be like the ones before."""
+        if came & (RESTARTED | SET_BACK):
+            state.believed = Believed()
+        if came & SET_BACK:
+            state.watch = NOTHING_SEEN
+        return bool(came & SEEN)
 
-    def _publish(self, state: EstimatorState, now_ns: int) -> tuple[EstimatorState, tuple[Outgoing, ...]]:
-        cause = state.memory.tell(now_ns)
-        if cause is None:
-            return state, ()
-        newest = state.memory.newest
-        capture_ns, status = columns_of(newest)[["capture_ns", "status"]][0].item()
-        payload = self.writer.write(newest, reason_number(status, cause), now_ns, state.receipts)
-        out = [Outgoing(self.topics.estimate, _ESTIMATE, payload, capture_ns)]
-        if self.certifying is not None:
-            estimate = load(Estimate, newest, 0)
-            certain = self.certifying.certain(state.believed, state.memory.history, estimate.capture_ns)
-            certified = certified_message(estimate, certain, now_ns, self.topics.follower)
-            out.append(outgoing(self.topics.certified, certified, estimate.capture_ns))
-        return replace(state, receipts=(), last_out_ns=now_ns), tuple(out)
+    def _told(self, state: EstimatorState, length: int, now_ns: int) -> tuple[Outgoing, ...]:
+        """An estimate whose message has a length, and what is certain of it if that is asked for."""
+        payload, capture_ns = state.memory.message(length)
+        told = Outgoing(self.topics.estimate, _ESTIMATE, payload, capture_ns)
+        if self.certifying is None:
+            return (told,)
+        estimate = load(Estimate, state.memory.desk.newest, 0)
+        certain = self.certifying.certain(state.believed, state.memory.history, capture_ns)
+        certified = certified_message(estimate, certain, now_ns, self.topics.follower)
+        return told, outgoing(self.topics.certified, certified, capture_ns)
 
-    def _tick(self, state: EstimatorState, now_ns: int) -> tuple[EstimatorState, tuple[Outgoing, ...]]:
+    def _tick(self, state: EstimatorState, now_ns: int) -> tuple[Outgoing, ...]:
         """Speak up while measurements are missing, and report on the node itself."""
-        out: tuple[Outgoing, ...] = ()
-        status = state.memory.status(now_ns)
-        if status in (Status.COASTING, Status.LOST) and (now_ns - state.last_out_ns) * 2 > _TICK_NS:
-            state, out = self._publish(state, now_ns)
+        length = state.memory.tick(now_ns)
+        out = self._told(state, length, now_ns) if length else ()
         if is_due(state.next_diagnostics_ns, _DIAGNOSTICS_NS, now_ns):
             out = (*out, self.report(state, now_ns))
-            state = replace(state, next_diagnostics_ns=now_ns + _DIAGNOSTICS_NS)
-        return replace(state, next_tick_ns=now_ns + _TICK_NS), out
+            state.next_diagnostics_ns = now_ns + _DIAGNOSTICS_NS
+        state.next_tick_ns = now_ns + TICK_NS
+        return out
 
     def report(self, state: EstimatorState, now_ns: int) -> Outgoing:
         """Diagnostics: status of the track, inputs taken and refused."""
@@ -251,7 +198,7 @@ class EstimatorNode:
         moving = known.own if self.scenario.estimator.own_motion == "mocap" else known.odometry
         problem = "" if known.track.length and moving.length else "waiting for mocap and odometry"
         values: dict[str, object] = {"status": state.memory.status(now_ns).name.lower()}
-        values |= self.frame_time.report(state.times)
+        values |= clock_report(state.times, state.memory.desk.time)
         values |= (
             offsets_report(state.memory.track[-1].belief)
             if self.scenario.estimator.bias_states and known.track.length
@@ -259,5 +206,6 @@ class EstimatorNode:
         )
         if self.aligns:
             values |= {f"odometry.{name}": value for name, value in state.watch.applied._asdict().items()}
-        values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)
+        taken, refused = state.memory.counts()
+        values |= named_counts("taken", taken) | named_counts("refused", refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)

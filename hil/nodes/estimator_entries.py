@@ -1,91 +1,249 @@
-"""The estimator's step, compiled: what Python enters once for every message that comes in."""
+"""The estimator's step, compiled: what Python enters once or twice for every message that comes in.
+
+An input is first read and checked, ``see_*``, and then taken into the tracks, ``take_*``; in between Python
+may look at it. Both work on the node's :class:`hil.nodes.estimator_desk.Desk`, in a row (1,).
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple, cast
 
-from estimation.models.measurement import Measurement, PairSeen
+from controllers.guard import CLOCK_TOLERANCE_NS
+from estimation.models.measurement import PairSeen, from_sensor, measure_body
 from estimation.own_motion.odometry_history import MotionSample
-from estimation.own_motion.own_track import OwnPoint
-from estimation.tracking.estimate import Estimate
-from estimation.tracking.track_point import TrackPoint
-from estimation.tracking.tracker import newest, status_of
-from formation.kernel import entry
-from formation.records import Rows, borrowed, load, store
-from hil.nodes.estimator_step import Known, Memory, Outcome, Rules, by_odometry, outcome_of, take, take_frame
-from hil.nodes.estimator_step import estimate as newest_estimate
-from hil.nodes.estimator_step import take_odometry as taken_odometry
+from estimation.tracking.track_point import DUPLICATE, GATED, LATE
+from estimation.tracking.tracker import COASTING, LOST, newest, status_of
+from formation.angles import wrapped
+from formation.kernel import entry, interpreted, kernel
+from formation.pose import Pose
+from formation.records import Rows, load, store
+from hil.nodes import estimator_step as step
+from hil.nodes.estimator_desk import Desk, NodeRules, Notes, Shown, forget, forget_tracks, noted
+from hil.nodes.estimator_step import Known, Taken
+from hil.nodes.frame_time import time_of
+from hil.nodes.refusals import (
+    BAD_RANGE,
+    NO_BODY_FRONT_END,
+    NOT_REFUSED,
+    SAME_PLACE,
+    TAKEN_FRAME,
+    TAKEN_LATE,
+    TAKEN_ODOMETRY,
+    TAKEN_USED,
+    UNKNOWN_BODY,
+    count,
+    refusal_of,
+)
+from hil.nodes.status_reasons import reason_number
+from hil.wire.frame_layout import read_bodies
+from hil.wire.message_checks import check_frame, check_odometry, check_sighting
+from hil.wire.odometry_layout import read_odometry, read_sighting
+from hil.wire.records import Frame, FrameHead, Sighting, Wanted
+from hil.wire.told_estimate import told_numbers, write_told
+
+SEEN, RESTARTED, SET_BACK = 1, 2, 4
+"""What comes of an input that is seen, added up: it can be used, the clock of the frames has jumped, this
+host's clock was set back. Either of the last two makes what was known before worthless."""
+
+TICK_NS = 50_000_000
+"""How often a node looks whether there is still something to estimate from."""
+
+_SAME_PLACE = 1e-3  # two robots whose centres are this close [m] are one body under two names
 
 
-class Shown(NamedTuple):
-    """A mocap frame, captured at a time by the host's clock."""
+@kernel
+def _received(desk: Desk, digest: int, now_ns: int) -> int:
+    """Take note of an input; without what is known no more, if the clock was set back."""
+    if noted(desk, digest, now_ns):
+        return 0
+    # All that comes would be too late for what was heard before.
+    forget(desk)
+    return SET_BACK
 
-    capture_ns: int
-    seen: PairSeen
+
+@kernel
+def _read_frame(desk: Desk, payload: bytes, names: bytes, again: bool) -> Frame:
+    if not again:
+        store(desk.heads, 0, read_bodies(payload, names, desk.bodies))
+    return check_frame(load(FrameHead, desk.heads, 0), desk.bodies, load(Wanted, desk.wanted, 0))
+
+
+@kernel(inline=False)
+def _told(desk: Desk, reasons: bytes, now_ns: int) -> int:
+    """Put the newest estimate of a track that has one down, and its message into the buffer; its length."""
+    rules, notes = load(NodeRules, desk.rules, 0), load(Notes, desk.notes, 0)
+    told = step.estimate(load(Known, desk.known, 0), desk.points, rules.step, now_ns)
+    estimate = told.estimate
+    store(desk.newest, 0, estimate)
+    reason = reason_number(estimate.status, told.cause)
+    numbers = told_numbers(estimate, rules.assumed, reason, notes.receipts, now_ns)
+    store(desk.notes, 0, notes._replace(receipts=0, told_ns=now_ns))
+    return write_told(desk.buffer, rules.times_at, reasons, numbers, estimate.joint, desk.receipts)
+
+
+@kernel
+def _moved_on(desk: Desk, taken: Taken, reasons: bytes, now_ns: int) -> int:
+    """Keep what has become of a measurement, count it, and estimate from it if it was not in vain."""
+    store(desk.known, 0, taken.known)
+    notes, verdict = load(Notes, desk.notes, 0), taken.verdict
+    store(desk.notes, 0, notes._replace(verdict=verdict, cause=taken.cause, late=taken.late))
+    if verdict in (GATED, DUPLICATE, LATE):
+        count(desk.counts, refusal_of(verdict, taken.cause))
+    else:
+        count(desk.counts, TAKEN_USED)
+    if taken.late and verdict != DUPLICATE:
+        count(desk.counts, TAKEN_LATE)
+    return 0 if verdict in (DUPLICATE, LATE) else _told(desk, reasons, now_ns)
 
 
 @entry
-def frame(
-    points: Rows[TrackPoint],
-    history: Rows[MotionSample],
-    own: Rows[OwnPoint],
-    known: Rows[Known],
-    rules: Rows[Rules],
-    shown: Rows[Shown],
-) -> Outcome:
-    """Take in a mocap frame."""
-    memory, here = Memory(borrowed(points), borrowed(history), borrowed(own)), load(Shown, shown, 0)
-    taken = take_frame(load(Known, known, 0), memory, load(Rules, rules, 0), here.capture_ns, here.seen)
-    store(known, 0, taken.known)
-    return outcome_of(taken)
+def see_frame(desks: Rows[Desk], payload: bytes, names: bytes, again: bool, digest: int, now_ns: int) -> int:
+    """Read a mocap frame. ``names``: of the bodies, packed; ``again``: it has been read by another node."""
+    desk = load(Desk, desks, 0)
+    came = _received(desk, digest, now_ns)
+    frame = _read_frame(desk, payload, names, again)
+    if frame.cause != NOT_REFUSED:
+        count(desk.counts, frame.cause)
+        return came
+    notes, rules = load(Notes, desk.notes, 0), load(NodeRules, desk.rules, 0)
+    timed = time_of(notes.times, desk.time, rules.time, frame, now_ns)
+    store(desk.notes, 0, notes._replace(times=timed.times))
+    if timed.refusal != NOT_REFUSED:
+        count(desk.counts, timed.refusal)
+        return came
+    if timed.restart:
+        forget_tracks(desk)
+        came += RESTARTED
+    count(desk.counts, TAKEN_FRAME)
+    if frame.strangers > 0:
+        count(desk.counts, UNKNOWN_BODY)
+    dx, dy = frame.leader_x - frame.follower_x, frame.leader_y - frame.follower_y
+    if math.sqrt(dx * dx + dy * dy) < _SAME_PLACE:
+        count(desk.counts, SAME_PLACE)
+        return came
+    follower = Pose(frame.follower_x, frame.follower_y, frame.follower_theta)
+    store(desk.shown, 0, Shown(timed.capture_ns, PairSeen(frame.leader_x, frame.leader_y, follower)))
+    return came + SEEN
 
 
 @entry
-def sighting(
-    points: Rows[TrackPoint],
-    history: Rows[MotionSample],
-    own: Rows[OwnPoint],
-    known: Rows[Known],
-    rules: Rows[Rules],
-    measurements: Rows[Measurement],
-) -> Outcome:
-    """Take in a sighting whose measurement still lacks the follower's motion."""
-    memory, fixed = Memory(borrowed(points), borrowed(history), borrowed(own)), load(Rules, rules, 0)
-    now, due = load(Known, known, 0), load(Measurement, measurements, 0)
-    motion = by_odometry(now, memory, fixed, due.capture_ns)
-    taken = take(now, memory, fixed, due._replace(motion=motion))
-    store(known, 0, taken.known)
-    return outcome_of(taken)
+def see_odometry(desks: Rows[Desk], payload: bytes, digest: int, now_ns: int) -> int:
+    """Read the follower's odometry."""
+    desk = load(Desk, desks, 0)
+    came = _received(desk, digest, now_ns)
+    motion = check_odometry(read_odometry(payload), now_ns + CLOCK_TOLERANCE_NS)
+    if motion.cause != NOT_REFUSED:
+        count(desk.counts, motion.cause)
+        return came
+    store(desk.sample, 0, MotionSample(motion.stamp_ns, motion.v2, motion.u2))
+    count(desk.counts, TAKEN_ODOMETRY)
+    return came + SEEN
 
 
 @entry
-def odometry(
-    points: Rows[TrackPoint],
-    history: Rows[MotionSample],
-    own: Rows[OwnPoint],
-    known: Rows[Known],
-    rules: Rows[Rules],
-    samples: Rows[MotionSample],
-) -> None:
-    """Take in a sample of odometry."""
-    memory = Memory(borrowed(points), borrowed(history), borrowed(own))
-    sample = load(MotionSample, samples, 0)
-    after = taken_odometry(load(Known, known, 0), memory, load(Rules, rules, 0), sample)
-    store(known, 0, after)
+def see_sighting(desks: Rows[Desk], payload: bytes, digest: int, now_ns: int) -> int:
+    """Read a sighting of the leader, and put it right by what is known of the sensor."""
+    desk = load(Desk, desks, 0)
+    came, sensor = _received(desk, digest, now_ns), load(NodeRules, desk.rules, 0).sensor
+    if not sensor.used:
+        count(desk.counts, NO_BODY_FRONT_END)
+        return came
+    sighting = check_sighting(read_sighting(payload), now_ns + CLOCK_TOLERANCE_NS)
+    if sighting.cause != NOT_REFUSED:
+        count(desk.counts, sighting.cause)
+        return came
+    count(desk.counts, TAKEN_FRAME)
+    rho, alpha2 = sighting.rho - sensor.range_bias, wrapped(sighting.alpha2 - sensor.bearing_bias)
+    if rho <= 0.0:
+        count(desk.counts, BAD_RANGE)
+        return came
+    if sensor.x != 0.0 or sensor.y != 0.0:
+        rho, alpha2 = from_sensor(rho, alpha2, (sensor.x, sensor.y))
+    if rho < _SAME_PLACE:
+        count(desk.counts, SAME_PLACE)
+        return came
+    store(desk.sighting, 0, sighting._replace(rho=rho, alpha2=alpha2))
+    return came + SEEN
 
 
 @entry
-def status(points: Rows[TrackPoint], known: Rows[Known], rules: Rows[Rules], now_ns: int) -> int:
-    """Status of a track that has a point, for one who looks at it at ``now_ns``."""
-    point = newest(borrowed(points), load(Known, known, 0).track)
-    return status_of(point, now_ns, load(Rules, rules, 0).settings)
+def take_frame(desks: Rows[Desk], reasons: bytes, now_ns: int) -> int:
+    """Take the frame that was seen into the tracks; the length of the estimate's message, 0 for none."""
+    desk = load(Desk, desks, 0)
+    known, rules = load(Known, desk.known, 0), load(NodeRules, desk.rules, 0).step
+    shown = load(Shown, desk.shown, 0)
+    taken = step.take_frame(known, desk.memory(), rules, shown.capture_ns, shown.seen)
+    return _moved_on(desk, taken, reasons, now_ns)
 
 
 @entry
-def estimate(
-    points: Rows[TrackPoint], known: Rows[Known], rules: Rows[Rules], now_ns: int, estimates: Rows[Estimate]
-) -> int:
-    """Fill in the newest estimate of a track that has one, and tell the cause of its point."""
-    told = newest_estimate(load(Known, known, 0), borrowed(points), load(Rules, rules, 0), now_ns)
-    store(estimates, 0, told.estimate)
-    return told.cause
+def take_sighting(desks: Rows[Desk], reasons: bytes, now_ns: int) -> int:
+    """The same with the sighting that was seen."""
+    desk = load(Desk, desks, 0)
+    known, memory, seen = load(Known, desk.known, 0), desk.memory(), load(Sighting, desk.sighting, 0)
+    rules = load(NodeRules, desk.rules, 0)
+    sensor = rules.sensor
+    motion = step.by_odometry(known, memory, rules.step, seen.capture_ns)
+    measurement = measure_body(
+        seen.capture_ns, seen.rho, seen.alpha2, sensor.sigma_range, sensor.sigma_bearing, motion
+    )
+    return _moved_on(desk, step.take(known, memory, rules.step, measurement), reasons, now_ns)
+
+
+@entry
+def take_odometry(desks: Rows[Desk]) -> None:
+    """Take the odometry that was seen in, and fold again what came after the sample before it."""
+    desk = load(Desk, desks, 0)
+    known, sample = load(Known, desk.known, 0), load(MotionSample, desk.sample, 0)
+    rules = load(NodeRules, desk.rules, 0).step
+    store(desk.known, 0, step.take_odometry(known, desk.memory(), rules, sample))
+
+
+@entry
+def tick(desks: Rows[Desk], reasons: bytes, now_ns: int) -> int:
+    """Speak up if measurements are missing; the length of the message, 0 for none."""
+    desk = load(Desk, desks, 0)
+    known = load(Known, desk.known, 0)
+    if known.track.length == 0:
+        return 0
+    settings = load(NodeRules, desk.rules, 0).step.settings
+    found = status_of(newest(desk.points, known.track), now_ns, settings)
+    missing = found in (COASTING, LOST)
+    due = (now_ns - load(Notes, desk.notes, 0).told_ns) * 2 > TICK_NS
+    return _told(desk, reasons, now_ns) if missing and due else 0
+
+
+@entry
+def status(desks: Rows[Desk], now_ns: int) -> int:
+    """Status of a track that has a point, for one who looks at it now."""
+    desk = load(Desk, desks, 0)
+    point = newest(desk.points, load(Known, desk.known, 0).track)
+    return status_of(point, now_ns, load(NodeRules, desk.rules, 0).step.settings)
+
+
+class Steps(NamedTuple):
+    """The entries, or the plain functions behind them."""
+
+    see_frame: Callable[[Rows[Desk], bytes, bytes, bool, int, int], int]
+    see_odometry: Callable[[Rows[Desk], bytes, int, int], int]
+    see_sighting: Callable[[Rows[Desk], bytes, int, int], int]
+    take_frame: Callable[[Rows[Desk], bytes, int], int]
+    take_odometry: Callable[[Rows[Desk]], None]
+    take_sighting: Callable[[Rows[Desk], bytes, int], int]
+    tick: Callable[[Rows[Desk], bytes, int], int]
+    status: Callable[[Rows[Desk], int], int]
+
+
+COMPILED = Steps(
+    see_frame,
+    see_odometry,
+    see_sighting,
+    take_frame,
+    take_odometry,
+    take_sighting,
+    tick,
+    status,
+)
+PLAIN = Steps._make(interpreted(each) for each in cast("tuple[Any, ...]", COMPILED))

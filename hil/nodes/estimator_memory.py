@@ -1,27 +1,52 @@
-"""What an estimator remembers of leader and follower, changed in place by one call for every message.
+"""What an estimator remembers of leader and follower, changed in place by one or two calls for every message.
 
 Where the filter is a record, all of it lies in rows and the calls are compiled. An estimator that cannot be
-compiled goes through the very same functions in plain Python, over lists in the place of rows.
+compiled goes through the very same functions in plain Python, with a list in the place of its track.
 """
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
 
 from estimation.filters.filter import Filter
-from estimation.models.measurement import Measurement, PairSeen
-from estimation.own_motion.odometry_history import IDEAL, Correction, History, MotionSample
+from estimation.own_motion.odometry_history import Correction, History, MotionSample
 from estimation.own_motion.own_track import OwnPoint
+from estimation.time.host_time import TimeRows, time_rows
 from estimation.tracking.estimate import Estimate
 from estimation.tracking.track import Track, as_filter
 from estimation.tracking.track_point import TrackPoint
-from estimation.tracking.tracker import Status, newest, status_of
-from formation.records import Rows, columns_of, load, row_of, rows_of, store
-from formation.ring import EMPTY
-from hil.nodes import estimator_step as step
-from hil.nodes.estimator_step import FUSED, MOCAP, ODOMETRY, Known, Memory, Outcome, Rules, Told
+from estimation.tracking.tracker import Status
+from formation.kernel import compiles
+from formation.records import R, Rows, columns_of, lent, load, plain_rows_of, row_of, rows_of, store
+from formation.ring import Ring, place
+from hil.nodes.estimator_desk import (
+    NOTHING_KNOWN,
+    NOTHING_NOTED,
+    Desk,
+    NodeRules,
+    Notes,
+    SensorRules,
+    Shown,
+)
+from hil.nodes.estimator_entries import COMPILED, PLAIN
+from hil.nodes.estimator_step import FUSED, MOCAP, ODOMETRY, Known, Rules, Told, estimate
+from hil.nodes.frame_time import time_rules
+from hil.nodes.node import Counts
+from hil.nodes.refusals import COUNTED, REFUSALS, TAKEN, Count
+from hil.nodes.status_reasons import ALL_REASONS
 from hil.scenario.leader_model import input_trust, leader_filter, own_noise, pose_noise, track_settings
 from hil.scenario.schema import Scenario
+from hil.wire import message_types as msg
+from hil.wire.assumed_errors import AssumedErrors
+from hil.wire.cdr import packed_texts
+from hil.wire.messages import in_little_endian
+from hil.wire.reading import FrameReader
+from hil.wire.records import Receipt, Sighting, Wanted
+from hil.wire.templates import Template
+from hil.wire.writing import MOST_RECEIPTS
 
 HISTORY = 2.0
 """Seconds of odometry kept, enough for the latest frame that the ring can take."""
@@ -29,7 +54,10 @@ HISTORY = 2.0
 _FASTEST = 1000.0  # messages a second; what comes faster pushes older ones out
 _LEAST_ROOM = 64
 _SOURCES = {"odometry": ODOMETRY, "mocap": MOCAP, "fused": FUSED}
-_NOTHING = Known(EMPTY, EMPTY, EMPTY, IDEAL)
+_REASONS = packed_texts(ALL_REASONS)
+_FRAME, _SIGHTING, _ODOMETRY = (
+    kind.__msgtype__ for kind in (msg.RigidBodies, msg.RangeBearing, msg.Odometry)
+)
 
 
 def rules_of(scenario: Scenario) -> Rules:
@@ -48,128 +76,189 @@ def rules_of(scenario: Scenario) -> Rules:
     )
 
 
+def node_rules(scenario: Scenario, times_at: int) -> NodeRules:
+    """All that is fixed about a scenario's estimator node.
+
+    Raises :class:`UsageError` as :func:`rules_of` and :func:`hil.nodes.frame_time.time_rules` do.
+    """
+    given = scenario.estimator
+    sensor = SensorRules(
+        given.front_end == "body",
+        given.range_bias,
+        given.bearing_bias,
+        given.sensor_x,
+        given.sensor_y,
+        given.sigma_range,
+        given.sigma_bearing,
+    )
+    step, time = rules_of(scenario), time_rules(scenario)
+    return NodeRules(step, time, sensor, AssumedErrors.of(scenario), times_at)
+
+
 def room_for(seconds: float, rate: float = _FASTEST) -> int:
     """Places that a ring needs for messages of so many seconds at a rate [Hz]: a power of two."""
     return 1 << max(_LEAST_ROOM - 1, int(seconds * rate)).bit_length()
 
 
 class EstimatorMemory:
-    """Tracks of leader and follower, and odometry."""
+    """All that the node of an estimator keeps in rows, and its steps on them.
 
-    def __init__(self, rules: Rules) -> None:
-        self.rules = rules
-        self._room = room_for(rules.settings.window)
-        self._compiled = isinstance(rules.filter, Filter)
-        self._history = rows_of(MotionSample, room_for(rules.span))
-        self._own = rows_of(OwnPoint, self._room)
-        self._known = row_of(_NOTHING)
-        self._sample = rows_of(MotionSample, 1)
-        self.newest = rows_of(Estimate, 1)
-        if self._compiled:
-            from hil.nodes import estimator_entries as entries
+    ``reader``, ``wanted``: by what it looks at frames. ``template``: of the estimates that it tells; the
+    steps that return a number return the length of the message that stands in there then, 0 for none. What
+    each step does stands at :mod:`hil.nodes.estimator_entries`.
+    """
 
-            self._entries = entries
-            self._points = rows_of(TrackPoint, self._room)
-            self._rules = row_of(rules)
-            self._shown, self._seen = rows_of(entries.Shown, 1), rows_of(Measurement, 1)
-        else:
-            self._points = cast("Rows[TrackPoint]", [None] * self._room)
+    def __init__(
+        self, rules: NodeRules, reader: FrameReader, wanted: Rows[Wanted], template: Template
+    ) -> None:
+        self.rules, self.reader = rules, reader
+        self._wanted, self._template = wanted, template
+        self._compiled = isinstance(rules.step.filter, Filter) and compiles()
+        make = rows_of if self._compiled else plain_rows_of
+        room = room_for(rules.step.settings.window)
+        self.desk = Desk(
+            rules=row_of(rules) if self._compiled else cast("Rows[NodeRules]", [rules]),
+            points=make(TrackPoint, room),
+            history=rows_of(MotionSample, room_for(rules.step.span)),
+            own=rows_of(OwnPoint, room),
+            known=row_of(NOTHING_KNOWN),
+            time=time_rows(),
+            notes=row_of(NOTHING_NOTED),
+            receipts=rows_of(Receipt, MOST_RECEIPTS),
+            counts=rows_of(Count, COUNTED),
+            shown=rows_of(Shown, 1),
+            sample=rows_of(MotionSample, 1),
+            sighting=rows_of(Sighting, 1),
+            newest=rows_of(Estimate, 1),
+            buffer=template.buffer,
+            heads=reader.heads,
+            bodies=reader.bodies,
+            wanted=wanted,
+        )
+        self._steps = COMPILED if self._compiled else PLAIN
+        self._lent = lent(self.desk) if self._compiled else cast("Rows[Desk]", [self.desk])
+        self._capture_ns = columns_of(self.desk.newest)["capture_ns"]
 
     def copy(self) -> EstimatorMemory:
         """The same memory, to go on from twice."""
-        twin = EstimatorMemory(self.rules)
-        for name in ("_points", "_history", "_own", "_known"):
-            setattr(twin, name, getattr(self, name).copy())
+        twin = EstimatorMemory(self.rules, self.reader, self._wanted, self._template)
+        for name in ("points", "history", "own", "known", "notes", "receipts", "counts", "newest"):
+            getattr(twin.desk, name)[:] = getattr(self.desk, name)
+        for kept, other in zip(_columns(self.desk.time), _columns(twin.desk.time), strict=True):
+            other[:] = kept
         return twin
+
+    def see_frame(self, payload: bytes, digest: int, now_ns: int) -> int:
+        """Read a frame; what comes of it."""
+        reader = self.reader
+        again = reader.again(payload)
+        whole = payload if again else in_little_endian(payload, _FRAME)
+        return self._steps.see_frame(self._lent, whole, reader.packed, again, digest, now_ns)
+
+    def see_sighting(self, payload: bytes, digest: int, now_ns: int) -> int:
+        """Read a sighting; what comes of it."""
+        whole = in_little_endian(payload, _SIGHTING)
+        return self._steps.see_sighting(self._lent, whole, digest, now_ns)
+
+    def see_odometry(self, payload: bytes, digest: int, now_ns: int) -> int:
+        """Read odometry; what comes of it."""
+        whole = in_little_endian(payload, _ODOMETRY)
+        return self._steps.see_odometry(self._lent, whole, digest, now_ns)
+
+    def take_frame(self, now_ns: int) -> int:
+        """Take in the frame that was seen."""
+        return self._steps.take_frame(self._lent, _REASONS, now_ns)
+
+    def take_sighting(self, now_ns: int) -> int:
+        """Take in the sighting that was seen."""
+        return self._steps.take_sighting(self._lent, _REASONS, now_ns)
+
+    def take_odometry(self) -> None:
+        """Take in the odometry that was seen."""
+        self._steps.take_odometry(self._lent)
+
+    def tick(self, now_ns: int) -> int:
+        """Estimate if no measurement has led to that for a while."""
+        return self._steps.tick(self._lent, _REASONS, now_ns)
+
+    def message(self, length: int) -> tuple[bytes, int]:
+        """The message that a step has written, and the capture time that it speaks of."""
+        return self._template.payload(length), self._capture_ns.item(0)
+
+    def estimate(self, now_ns: int) -> Told | None:
+        """Newest estimate and why the newest measurement was not used; None before there is any."""
+        return estimate(self.known, self.desk.points, self.rules.step, now_ns) if self.begun else None
+
+    def status(self, now_ns: int) -> Status:
+        """Status of the track for one who looks at it at ``now_ns``."""
+        return Status(self._steps.status(self._lent, now_ns)) if self.begun else Status.INITIALISING
+
+    def correct(self, correction: Correction) -> None:
+        """Correct odometry so from now on."""
+        store(self.desk.known, 0, self.known._replace(correction=correction))
 
     @property
     def known(self) -> Known:
         """Where the rows are filled."""
-        return load(Known, self._known, 0)
+        return load(Known, self.desk.known, 0)
+
+    @property
+    def notes(self) -> Notes:
+        """What is remembered beside the tracks."""
+        return load(Notes, self.desk.notes, 0)
+
+    @property
+    def shown(self) -> Shown:
+        """The frame that was seen last."""
+        return load(Shown, self.desk.shown, 0)
+
+    @property
+    def sample(self) -> MotionSample:
+        """The odometry that was seen last."""
+        return load(MotionSample, self.desk.sample, 0)
+
+    @property
+    def sighting(self) -> Sighting:
+        """The sighting that was seen last, put right."""
+        return load(Sighting, self.desk.sighting, 0)
 
     @property
     def track(self) -> Track:
         """Points of the leader's track, oldest first."""
-        ring = self.known.track
-        return tuple(
-            load(TrackPoint, self._points, (ring.first + k) % self._room) for k in range(ring.length)
-        )
+        return tuple(_held(TrackPoint, self.desk.points, self.known.track))
 
     @property
     def begun(self) -> bool:
         """Whether there is a track of the leader."""
-        return bool(columns_of(self._known)["track"]["length"][0] > 0)
+        return self.known.track.length > 0
 
     @property
     def history(self) -> History:
         """Odometry, oldest first."""
-        ring, room = self.known.odometry, room_for(self.rules.span)
-        return tuple(load(MotionSample, self._history, (ring.first + k) % room) for k in range(ring.length))
-
-    def forget(self) -> None:
-        """Know nothing any more."""
-        store(self._known, 0, _NOTHING._replace(correction=self.known.correction))
-
-    def forget_tracks(self) -> None:
-        """Know nothing of where leader and follower are."""
-        store(self._known, 0, self.known._replace(track=EMPTY, own=EMPTY))
-
-    def correct(self, correction: Correction) -> None:
-        """Correct odometry so from now on."""
-        store(self._known, 0, self.known._replace(correction=correction))
-
-    def take_frame(self, capture_ns: int, seen: PairSeen) -> Outcome:
-        """Take in a mocap frame that was captured at a time by the host's clock."""
-        if self._compiled:
-            store(self._shown, 0, self._entries.Shown(capture_ns, seen))
-            return self._entries.frame(*self._memory, self._known, self._rules, self._shown)
-        taken = step.take_frame(self.known, self._memory, self.rules, capture_ns, seen)
-        return self._taken(taken)
-
-    def take_sighting(self, measurement: Measurement) -> Outcome:
-        """Take in a sighting; its motion is looked up here."""
-        if self._compiled:
-            store(self._seen, 0, measurement)
-            return self._entries.sighting(*self._memory, self._known, self._rules, self._seen)
-        known = self.known
-        motion = step.by_odometry(known, self._memory, self.rules, measurement.capture_ns)
-        return self._taken(step.take(known, self._memory, self.rules, measurement._replace(motion=motion)))
-
-    def take_odometry(self, sample: MotionSample) -> None:
-        """Take in a sample of odometry, and fold again what came after the sample before it."""
-        if self._compiled:
-            store(self._sample, 0, sample)
-            self._entries.odometry(*self._memory, self._known, self._rules, self._sample)
-        else:
-            store(self._known, 0, step.take_odometry(self.known, self._memory, self.rules, sample))
-
-    def estimate(self, now_ns: int) -> Told | None:
-        """Newest estimate and why the newest measurement was not used; None before there is any."""
-        cause = self.tell(now_ns)
-        return None if cause is None else Told(load(Estimate, self.newest, 0), cause)
-
-    def tell(self, now_ns: int) -> int | None:
-        """As :meth:`estimate`, which is left in ``newest``, a row; returns the cause alone."""
-        if not self.begun:
-            return None
-        if self._compiled:
-            return self._entries.estimate(self._points, self._known, self._rules, now_ns, self.newest)
-        told = step.estimate(self.known, self._points, self.rules, now_ns)
-        store(self.newest, 0, told.estimate)
-        return told.cause
-
-    def status(self, now_ns: int) -> Status:
-        """Status of the track for one who looks at it at ``now_ns``."""
-        if not self.begun:
-            return Status.INITIALISING
-        if self._compiled:
-            return Status(self._entries.status(self._points, self._known, self._rules, now_ns))
-        return Status(status_of(newest(self._points, self.known.track), now_ns, self.rules.settings))
+        return tuple(_held(MotionSample, self.desk.history, self.known.odometry))
 
     @property
-    def _memory(self) -> Memory:
-        return Memory(self._points, self._history, self._own)
+    def receipts(self) -> tuple[Receipt, ...]:
+        """Receipts of the inputs since the last estimate."""
+        return tuple(load(Receipt, self.desk.receipts, k) for k in range(self.notes.receipts))
 
-    def _taken(self, taken: Any) -> Outcome:
-        store(self._known, 0, taken.known)
-        return step.outcome_of(taken)
+    def counts(self) -> tuple[Counts, Counts]:
+        """How many inputs were taken, by kind, and refused, by cause; none that is 0."""
+        times = columns_of(self.desk.counts)["times"].tolist()
+        refused: dict[str, int] = {}
+        for word, count in zip(REFUSALS, times, strict=False):
+            if count:
+                refused[word] = refused.get(word, 0) + count
+        taken = zip(TAKEN, times[len(REFUSALS) :], strict=True)
+        return {word: count for word, count in taken if count}, refused
+
+
+def _held(kind: type[R], rows: Rows[R], ring: Ring) -> list[R]:
+    return [load(kind, rows, place(ring, rows, k)) for k in range(ring.length)]
+
+
+def _columns(time: TimeRows) -> list[NDArray[np.void]]:
+    """All rows that are known of a clock."""
+    clock = time.clock
+    known = [columns_of(clock.lowest), columns_of(clock.recent), columns_of(clock.suspects)]
+    return [*known, columns_of(time.knots)]

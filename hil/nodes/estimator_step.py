@@ -105,25 +105,11 @@ class Taken(NamedTuple):
     late: bool
 
 
-class Outcome(NamedTuple):
-    """The same without what is known: verdict, cause, and 1 for late."""
-
-    verdict: int
-    cause: int
-    late: int
-
-
 class Told(NamedTuple):
     """An estimate, and why the newest measurement was not used."""
 
     estimate: Estimate
     cause: int
-
-
-@kernel
-def outcome_of(taken: Taken) -> Outcome:
-    """What became of a frame or sighting, in numbers."""
-    return Outcome(taken.verdict, taken.cause, 1 if taken.late else 0)
 
 
 @kernel

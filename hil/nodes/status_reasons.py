@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from estimation.tracking.follower_check import Cause
 from estimation.tracking.tracker import Status
+from formation.kernel import kernel
 
 REASONS = {
     Status.INITIALISING: "speed and bearing of the leader not yet known well enough",
@@ -21,9 +22,10 @@ REJECTIONS = {
 }
 
 
-_CAUSES = max(Cause) + 1
+_CAUSES = len(Cause)
 
 
+@kernel
 def reason_number(status: int, cause: int) -> int:
     """Where the reason of :func:`reason_for` stands among :data:`ALL_REASONS`."""
     return status * _CAUSES + cause

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.own_motion.input_alignment import UNKNOWN, Alignment, align_odometry
-from estimation.time.host_time import HostTime
+from estimation.time.host_time import NO_TIME_YET, time_rows
+from formation.records import plain_rows_of
 from hil.log.reader import Log
-from hil.nodes.frame_time import FrameTime
+from hil.nodes.frame_time import time_of, time_rules
+from hil.nodes.refusals import NOT_REFUSED
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.reading import RefusedError, read_frame, read_odometry
@@ -34,7 +36,7 @@ def own_record(log: Log, scenario: Scenario) -> OwnRecord:
     names = topics_of(scenario)
     poses: dict[int, tuple[float, float, float]] = {}
     motions: dict[int, tuple[float, float]] = {}
-    times, frame_time = HostTime(), FrameTime(scenario)
+    times, rows, rules = NO_TIME_YET, time_rows(plain_rows_of), time_rules(scenario)
     for record in log.records([name for name in (topics.RIGID_BODIES, names.odom) if name in log.topics]):
         try:
             if record.topic == names.odom:
@@ -42,9 +44,9 @@ def own_record(log: Log, scenario: Scenario) -> OwnRecord:
                 motions[sample.stamp_ns] = (sample.v2, sample.u2)
             else:
                 frame = read_frame(record.payload, names.leader, names.follower)
-                timed = frame_time.of(times, frame, record.log_ns)
+                timed = time_of(times, rows, rules, frame, record.log_ns)
                 times = timed.times
-                if not timed.refusal:
+                if timed.refusal == NOT_REFUSED:
                     poses[timed.capture_ns] = (frame.follower.x, frame.follower.y, frame.follower.theta)
         except RefusedError:
             continue

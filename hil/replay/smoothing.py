@@ -16,13 +16,14 @@ from estimation.tracking.track_point import NO_JUMP
 from formation.records import row_of
 from hil.nodes.estimator import NAME, EstimatorNode, EstimatorState
 from hil.nodes.node import Outgoing
-from hil.nodes.status_reasons import reason_number
+from hil.nodes.status_reasons import ALL_REASONS, reason_number
 from hil.scenario.leader_model import refuse_bias_states
 from hil.scenario.schema import Scenario
 from hil.wire.certified_message import certified_message
 from hil.wire.events import Event
 from hil.wire.message_types import CertifiedEstimate, LeaderEstimate
 from hil.wire.messages import decode_as
+from hil.wire.writing import EstimateWriter
 
 
 class ListeningEstimator(EstimatorNode):
@@ -66,14 +67,15 @@ def smoothed_estimates(node: ListeningEstimator) -> Smoothed:
     They are stamped as computed at their capture, as a smoother knows no delay.
     """
     estimates, certified = [], []
-    tracker = Tracker(node.rules.filter, node.rules.settings)
+    writer = EstimateWriter(node.topics.follower, node.rules.assumed, ALL_REASONS)
+    tracker = Tracker(node.rules.step.filter, node.rules.step.settings)
     for point in smooth(tracker, node.measurements.values()):
         measurement = point.measurement
         capture_ns, frame_id = measurement.capture_ns, node.topics.follower
         status = tracker.status((point,), capture_ns)
         estimate = estimate_of(point.belief, measurement, status, point.nis, point.used_ns, NO_JUMP)
         reason = reason_number(status, Cause.NONE)
-        told = node.writer.write(row_of(estimate), reason, capture_ns, ())
+        told = writer.write(row_of(estimate), reason, capture_ns, ())
         estimates.append(decode_as(told, LeaderEstimate))
         if node.certifying is not None:
             certain = node.certain.get(capture_ns, Failed.UNSEEN)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from dataclasses import dataclass, field
+
+_SIGN, _TWICE_SIGN = 1 << 63, 1 << 64
 
 
 @dataclass(slots=True, unsafe_hash=True)
@@ -24,11 +27,24 @@ class Event:
             self._digest = digest(self.topic, self.payload)
         return self._digest
 
+    @property
+    def signed_digest(self) -> int:
+        """The same 64 bits taken for a signed number, as rows hold it."""
+        digest = self.digest
+        return digest - _TWICE_SIGN if digest >= _SIGN else digest
+
 
 TICK = Event()
 
 
 def digest(topic: str, payload: bytes) -> int:
     """Identify a payload on a topic by 64 bits of BLAKE2b, so that a log can say what a step consumed."""
-    name = topic.encode()
-    return int.from_bytes(hashlib.blake2b(name + b"\0" + payload, digest_size=8).digest(), "little")
+    hasher = _begun(topic).copy()
+    hasher.update(payload)
+    return int.from_bytes(hasher.digest(), "little")
+
+
+@functools.lru_cache(maxsize=1024)
+def _begun(topic: str) -> hashlib.blake2b:
+    """What hashes of all payloads on a topic begin with."""
+    return hashlib.blake2b(topic.encode() + b"\0", digest_size=8)

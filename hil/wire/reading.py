@@ -35,20 +35,26 @@ class FrameReader:
         self.names = tuple(names)
         self.bodies = rows_of(Body, len(names))
         self.heads = rows_of(FrameHead, 1)
-        self._packed = packed_texts(self.names)
+        self.packed = packed_texts(self.names)
         self._payload = b""
 
     def pair(self, leader: str, follower: str, latest_ns: int = ANY_TIME_NS) -> Rows[Wanted]:
         """What a pair wants of a frame; a stamp after ``latest_ns`` lies in the future."""
         return row_of(Wanted(self.names.index(leader), self.names.index(follower), latest_ns))
 
+    def again(self, payload: bytes) -> bool:
+        """Whether heads and bodies are of this very payload already; if not, who asks is to read it now."""
+        if payload is self._payload and payload:
+            return True
+        self._payload = payload
+        return False
+
     def read(self, payload: bytes, wanted: Rows[Wanted]) -> Frame:
         """The frame as a pair sees it; its cause tells whether it is used."""
-        if payload is self._payload and payload:
+        if self.again(payload):
             return entries.look_again(self.heads, self.bodies, wanted)
-        self._payload = payload
         whole = in_little_endian(payload, msg.RigidBodies.__msgtype__)
-        return entries.take_frame(whole, self._packed, self.heads, self.bodies, wanted)
+        return entries.take_frame(whole, self.packed, self.heads, self.bodies, wanted)
 
 
 def read_frame(

@@ -10,7 +10,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 import pytest
@@ -25,6 +25,7 @@ from formation.records import (
     columns_of,
     copy_of,
     dtype_of,
+    lent,
     load,
     read_byte,
     read_float,
@@ -88,6 +89,19 @@ def copied(payload: bytes, buffer: Buffer) -> int:
     return read_uint32(payload, 13)
 
 
+class Workplace(NamedTuple):
+    number: int
+    bodies: Rows[Body]
+    buffer: Buffer
+
+
+@entry
+def write_total(workplaces: Rows[Workplace], dx: float) -> int:
+    here = load(Workplace, workplaces, 0)
+    write_float(here.buffer, 1, all_moved(here.bodies, dx))
+    return here.number + size(here.bodies)
+
+
 def bodies() -> Rows[Body]:
     rows = rows_of(Body, 3)
     store(rows, 1, Body(Place(1.0, 2.0), 5, True))
@@ -106,6 +120,17 @@ def test_a_list_serves_plain_python_as_well_as_rows() -> None:
     kept: list[Body] = [Body(Place(1.0, 2.0), 5, True)]
     assert all_moved(kept, 0.5) == 1.5  # type: ignore[arg-type]
     assert kept == [Body(Place(1.5, 2.0), 6, False)]
+
+
+def test_an_entry_works_in_rows_that_it_is_lent() -> None:
+    found = []
+    for function in (write_total, interpreted(write_total)):
+        place = Workplace(7, bodies(), np.zeros(9, np.uint8))
+        plain = cast("Rows[Workplace]", [place])
+        assert function(lent(place) if function is write_total else plain, 0.5) == 10
+        found.append((columns_of(place.bodies).tobytes(), place.buffer.tobytes()))
+    assert found[0] == found[1]
+    assert struct.unpack_from("<d", found[0][1], 1) == (2.5,)
 
 
 @given(st.integers(0, 255), st.floats(), st.integers(-(2**31), 2**31 - 1), st.integers(0, 2**32 - 1))
@@ -185,7 +210,7 @@ def test_an_edit_in_an_imported_kernel_recompiles_and_nothing_else_does(tmp_path
     assert run(LEAF.format(weight="5.0")) == "10.0 0"
 
 
-RECORD = """from typing import NamedTuple
+RECORD = """from typing import NamedTuple, cast
 from formation.kernel import kernel
 class {name}(NamedTuple):
     x: float

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import pytest
@@ -13,21 +13,28 @@ import pytest
 from estimation.filters.belief import Model
 from estimation.filters.estimators import settling
 from estimation.filters.filter import Kind, filter_of
-from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
-from estimation.models.measurement import FrontEnd, Measurement, PairSeen, PoseNoise, measure_body
-from estimation.own_motion.odometry_history import IDEAL, InputTrust, MotionSample
+from estimation.models.coordinated_turn import LeaderLimits, ProcessNoise
+from estimation.models.measurement import FrontEnd, PairSeen, PoseNoise
+from estimation.own_motion.odometry_history import InputTrust, MotionSample
 from estimation.own_motion.own_track import OwnNoise, OwnPoint
-from estimation.tracking.estimate import Estimate
 from estimation.tracking.follower_check import Cause
 from estimation.tracking.track_point import TrackPoint, Verdict
 from estimation.tracking.tracker import TrackSettings
-from formation.kernel import interpreted
 from formation.pose import Pose, advance
-from formation.records import Rows, columns_of, load, row_of, rows_of
-from formation.ring import EMPTY, Ring
-from hil.nodes import estimator_entries as entries
-from hil.nodes.estimator_entries import Shown
-from hil.nodes.estimator_step import FUSED, MOCAP, ODOMETRY, Known, Outcome, Rules
+from formation.records import Rows, columns_of, lent, load, rows_of, store
+from formation.ring import Ring
+from hil.nodes.estimator_desk import Desk, NodeRules, Notes, SensorRules, Shown
+from hil.nodes.estimator_entries import COMPILED, PLAIN
+from hil.nodes.estimator_memory import EstimatorMemory
+from hil.nodes.estimator_step import FUSED, MOCAP, ODOMETRY, Known, Rules, Told, estimate
+from hil.nodes.frame_time import TimeRules
+from hil.nodes.status_reasons import ALL_REASONS
+from hil.scenario.files import load_scenario
+from hil.wire.assumed_errors import AssumedErrors
+from hil.wire.cdr import packed_texts
+from hil.wire.reading import frame_reader
+from hil.wire.records import Sighting
+from hil.wire.templates import estimate_template
 from tests.bits import same_bits
 
 FRAME_NS, ODOMETRY_NS = 8_333_333, 33_333_333
@@ -37,9 +44,10 @@ NOISE = PoseNoise(3e-4, 3.5e-3)
 SOURCES = {ODOMETRY: "odometry", MOCAP: "mocap", FUSED: "fused"}
 SETUPS = list(product(Kind, FrontEnd, SOURCES))
 SETUP_IDS = [f"{kind.name.lower()}-{front_end.value}-{SOURCES[source]}" for kind, front_end, source in SETUPS]
-UNKNOWN = FollowerMotion(0.0, 0.0, 0.0, 0.0)
+REASONS = packed_texts(ALL_REASONS)
+ASSUMED = AssumedErrors.of(load_scenario("turtlebot3"))
 
-Message = Shown | Measurement | MotionSample
+Message = Shown | Sighting | MotionSample
 
 
 class Sent(NamedTuple):
@@ -64,43 +72,69 @@ def rules(kind: Kind, front_end: FrontEnd, source: int) -> Rules:
     )
 
 
+class Outcome(NamedTuple):
+    """What became of a frame or sighting."""
+
+    verdict: int
+    cause: int
+    late: bool
+
+
 class Estimator:
-    """Rows of an estimator, and the entries or the plain functions behind them."""
+    """An estimator's desk, and the entries that work at it, or the plain functions behind them."""
 
     def __init__(self, fixed: Rules, *, plain: bool = False, room: int = 256) -> None:
-        self.points, self.own = rows_of(TrackPoint, room), rows_of(OwnPoint, room)
-        self.history, self.known = rows_of(MotionSample, room), row_of(Known(EMPTY, EMPTY, EMPTY, IDEAL))
-        self.rules, self.estimate = row_of(fixed), rows_of(Estimate, 1)
-        self._call: Callable[[Any], Any] = interpreted if plain else lambda entry: entry
+        template = estimate_template("follower", 8)
+        sensor = SensorRules(True, 0.0, 0.0, 0.0, 0.0, 1e-3, 2e-3)
+        rules = NodeRules(fixed, TimeRules(True, 0, 0), sensor, ASSUMED, template.numbers_at)
+        reader = frame_reader(frozenset({"leader", "follower"}))
+        memory = EstimatorMemory(rules, reader, reader.pair("leader", "follower"), template)
+        self.desk = memory.desk._replace(
+            points=rows_of(TrackPoint, room), own=rows_of(OwnPoint, room), history=rows_of(MotionSample, room)
+        )
+        self._steps = PLAIN if plain else COMPILED
+        self._lent = cast("Rows[Desk]", [self.desk]) if plain else lent(self.desk)
 
-    def take(self, message: Message) -> Outcome | None:
-        kept = (self.points, self.history, self.own, self.known, self.rules)
+    def take(self, message: Message, now_ns: int) -> Outcome | None:
         if isinstance(message, MotionSample):
-            self._call(entries.odometry)(*kept, row_of(message))
+            store(self.desk.sample, 0, message)
+            self._steps.take_odometry(self._lent)
             return None
-        entry = entries.frame if isinstance(message, Shown) else entries.sighting
-        outcome: Outcome = self._call(entry)(*kept, row_of(message))
-        return outcome
+        if isinstance(message, Shown):
+            store(self.desk.shown, 0, message)
+            self._steps.take_frame(self._lent, REASONS, now_ns)
+        else:
+            store(self.desk.sighting, 0, message)
+            self._steps.take_sighting(self._lent, REASONS, now_ns)
+        notes = load(Notes, self.desk.notes, 0)
+        return Outcome(notes.verdict, notes.cause, notes.late)
 
-    def told(self, now_ns: int) -> tuple[Estimate, int]:
-        cause = self._call(entries.estimate)(self.points, self.known, self.rules, now_ns, self.estimate)
-        return load(Estimate, self.estimate, 0), cause
+    def told(self, now_ns: int) -> Told:
+        return estimate(self.rings(), self.desk.points, load(NodeRules, self.desk.rules, 0).step, now_ns)
 
     def rings(self) -> Known:
-        return load(Known, self.known, 0)
+        return load(Known, self.desk.known, 0)
 
     def track(self) -> list[TrackPoint]:
-        return held(TrackPoint, self.points, self.rings().track)
+        return held(TrackPoint, self.desk.points, self.rings().track)
 
     def own_track(self) -> list[OwnPoint]:
-        return held(OwnPoint, self.own, self.rings().own)
+        return held(OwnPoint, self.desk.own, self.rings().own)
 
     def odometry(self) -> list[MotionSample]:
-        return held(MotionSample, self.history, self.rings().odometry)
+        return held(MotionSample, self.desk.history, self.rings().odometry)
 
     def bytes(self) -> tuple[bytes, ...]:
-        every: tuple[Rows[Any], ...] = (self.points, self.own, self.history, self.known, self.estimate)
-        return tuple(columns_of(rows).tobytes() for rows in every)
+        desk = self.desk
+        every: tuple[Rows[Any], ...] = (
+            desk.points,
+            desk.own,
+            desk.history,
+            desk.known,
+            desk.newest,
+            desk.notes,
+        )
+        return (*(columns_of(rows).tobytes() for rows in every), desk.buffer.tobytes())
 
 
 def held(kind: type[Any], rows: Rows[Any], ring: Ring) -> list[Any]:
@@ -133,10 +167,10 @@ class Pair:
         v, u = (self.random.standard_normal(2) * [2e-3, 1e-2]).tolist()
         return MotionSample(self.at_ns, self.v2 + v, self.u2 + u)
 
-    def sighting(self) -> Measurement:
+    def sighting(self) -> Sighting:
         dx, dy = self.leader.x - self.follower.x, self.leader.y - self.follower.y
         bearing = math.atan2(dy, dx) - self.follower.theta
-        return measure_body(self.at_ns, math.sqrt(dx * dx + dy * dy), bearing, 1e-3, 2e-3, UNKNOWN)
+        return Sighting(0, self.at_ns, math.sqrt(dx * dx + dy * dy), bearing)
 
 
 def smooth_drive(seed: int, frames: int) -> list[Sent]:
@@ -204,13 +238,13 @@ def test_compiled_and_plain_give_the_same_bits_whatever_comes(
     compiled, plain = Estimator(fixed), Estimator(fixed, plain=True)
     verdicts, causes, late = set[int](), set[int](), 0
     for number, sent in enumerate(rough_drive(len(SETUP_IDS), front_end is FrontEnd.BODY)):
-        outcome = compiled.take(sent.message)
-        assert plain.take(sent.message) == outcome
+        now_ns = round(sent.arrives_ns)
+        outcome = compiled.take(sent.message, now_ns)
+        assert plain.take(sent.message, now_ns) == outcome
         if outcome is not None:
             verdicts.add(outcome.verdict)
             causes.add(outcome.cause)
             late += outcome.late
-            now_ns = round(sent.arrives_ns)
             same_bits(compiled.told(now_ns), plain.told(now_ns))
         if number % 20 == 0:
             assert compiled.bytes() == plain.bytes()
@@ -224,7 +258,7 @@ def test_compiled_and_plain_give_the_same_bits_whatever_comes(
 def delivered(fixed: Rules, messages: Iterable[Sent], room: int = 256) -> Estimator:
     estimator = Estimator(fixed, room=room)
     for sent in messages:
-        estimator.take(sent.message)
+        estimator.take(sent.message, round(sent.arrives_ns))
     return estimator
 
 
@@ -290,7 +324,7 @@ def test_with_little_room_nothing_breaks_whatever_comes(
     estimator = Estimator(fixed, room=room)
     for sent in rough_drive(room, front_end is FrontEnd.BODY):
         before = [point.measurement.capture_ns for point in estimator.track()]
-        outcome = estimator.take(sent.message)
+        outcome = estimator.take(sent.message, round(sent.arrives_ns))
         after = [point.measurement.capture_ns for point in estimator.track()]
         if outcome is not None and outcome.verdict in (Verdict.LATE, Verdict.DUPLICATE):
             assert after == before

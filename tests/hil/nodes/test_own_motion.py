@@ -129,7 +129,7 @@ def test_a_heading_that_turns_round_for_a_while_leaves_the_own_track_alone(sourc
 
 
 def test_bounds_take_the_noise_of_the_source_for_granted() -> None:
-    E_v2 = {source: node_with(source).assumed.E_v2 for source in ("odometry", "mocap", "fused")}
+    E_v2 = {source: node_with(source).rules.assumed.E_v2 for source in ("odometry", "mocap", "fused")}
     assert E_v2["odometry"] == pytest.approx(3.0 * 0.005)
     assert E_v2["fused"] < E_v2["mocap"]
     _, found = fed(node_with("mocap"), frames(240))

@@ -1,0 +1,134 @@
+"""What an estimator's node works with: its rules, and the rows in which all lies that it remembers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from controllers.guard import CLOCK_TOLERANCE_NS
+from estimation.models.measurement import PairSeen
+from estimation.own_motion.odometry_history import IDEAL, MotionSample
+from estimation.own_motion.own_track import OwnPoint
+from estimation.time.host_time import NO_TIME_YET, HostTime, TimeRows
+from estimation.tracking.estimate import Estimate
+from estimation.tracking.track_point import TrackPoint
+from formation.kernel import kernel
+from formation.records import Buffer, Rows, load, size, store
+from formation.ring import EMPTY
+from hil.nodes.estimator_step import Known, Memory, Rules
+from hil.nodes.frame_time import TimeRules
+from hil.nodes.refusals import Count
+from hil.wire.assumed_errors import AssumedErrors
+from hil.wire.records import Body, FrameHead, Receipt, Sighting, Wanted
+
+
+class SensorRules(NamedTuple):
+    """A sensor on board: whether it is looked at, what it reads too much, where it is, and its noise.
+
+    x, y: [m] ahead of the middle of the wheel axis and to the left of it.
+    """
+
+    used: bool
+    range_bias: float
+    bearing_bias: float
+    x: float
+    y: float
+    sigma_range: float
+    sigma_bearing: float
+
+
+class NodeRules(NamedTuple):
+    """All that is fixed about an estimator's node; ``times_at``: where an estimate's times stand."""
+
+    step: Rules
+    time: TimeRules
+    sensor: SensorRules
+    assumed: AssumedErrors
+    times_at: int
+
+
+class Shown(NamedTuple):
+    """A mocap frame, captured at a time by the host's clock."""
+
+    capture_ns: int
+    seen: PairSeen
+
+
+class Notes(NamedTuple):
+    """What a node remembers beside its tracks.
+
+    ``receipts``: how many inputs have come since the last estimate. ``heard_ns``: when the newest one of all
+    came. ``told_ns``: when the last estimate went out. ``verdict``, ``cause``: what became of the newest
+    measurement, ``late`` whether it was captured before the newest.
+    """
+
+    times: HostTime
+    receipts: int
+    heard_ns: int
+    told_ns: int
+    verdict: int
+    cause: int
+    late: bool
+
+
+NOTHING_NOTED = Notes(NO_TIME_YET, 0, 0, 0, 0, 0, False)
+
+
+class Desk(NamedTuple):
+    """Rows of a node: (1,) but for tracks, odometry, clock, receipts, counts and bodies.
+
+    ``shown``, ``sample``, ``sighting``: the newest input, read and checked. ``newest``: the last estimate.
+    ``buffer``: its message. ``heads``, ``bodies``, ``wanted``: as a frame is read.
+    """
+
+    rules: Rows[NodeRules]
+    points: Rows[TrackPoint]
+    history: Rows[MotionSample]
+    own: Rows[OwnPoint]
+    known: Rows[Known]
+    time: TimeRows
+    notes: Rows[Notes]
+    receipts: Rows[Receipt]
+    counts: Rows[Count]
+    shown: Rows[Shown]
+    sample: Rows[MotionSample]
+    sighting: Rows[Sighting]
+    newest: Rows[Estimate]
+    buffer: Buffer
+    heads: Rows[FrameHead]
+    bodies: Rows[Body]
+    wanted: Rows[Wanted]
+
+    @kernel
+    def memory(self) -> Memory:
+        """Where the tracks lie."""
+        return Memory(self.points, self.history, self.own)
+
+
+@kernel
+def noted(desk: Desk, digest: int, now_ns: int) -> bool:
+    """Note an input's receipt; whether it came after the one before, or the clock was set back."""
+    notes = load(Notes, desk.notes, 0)
+    count = notes.receipts
+    if count == size(desk.receipts):
+        # Odometry without any frame must not fill the memory.
+        count -= 1
+        for k in range(count):
+            store(desk.receipts, k, load(Receipt, desk.receipts, k + 1))
+    store(desk.receipts, count, Receipt(digest, now_ns))
+    store(desk.notes, 0, notes._replace(receipts=count + 1, heard_ns=now_ns))
+    return now_ns >= notes.heard_ns - CLOCK_TOLERANCE_NS
+
+
+NOTHING_KNOWN = Known(EMPTY, EMPTY, EMPTY, IDEAL)
+
+
+@kernel
+def forget(desk: Desk) -> None:
+    """Know nothing any more of leader and follower."""
+    store(desk.known, 0, NOTHING_KNOWN)
+
+
+@kernel
+def forget_tracks(desk: Desk) -> None:
+    """Know nothing of where leader and follower are."""
+    store(desk.known, 0, load(Known, desk.known, 0)._replace(track=EMPTY, own=EMPTY))
