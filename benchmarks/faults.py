@@ -41,7 +41,7 @@ from formation.records import load, store
 from formation.shape import Shape, follower_pose, shape_of, shape_rates
 from hil.emulator.faults import Pair, fault_rows, faulty
 from hil.nodes.estimator import EstimatorNode
-from hil.nodes.estimator_desk import Shown
+from hil.nodes.estimator_desk import TimedFrame
 from hil.scenario.files import load_scenario
 from hil.scenario.parts import gains, leader_program
 from hil.scenario.schema import FaultSection, Scenario
@@ -173,7 +173,7 @@ def inject(
             continue
         last = shown = frame.pair
         seen = PairSeen(shown.leader.x, shown.leader.y, shown.follower)
-        store(memory.desk.shown, 0, Shown(capture_ns, seen))
+        store(memory.desk.frame, 0, TimedFrame(capture_ns, seen))
         memory.take_frame(capture_ns)
         found, verdict = load(Estimate, memory.desk.newest, 0), memory.notes.verdict
         score.frames += 1

@@ -22,6 +22,7 @@ from hil.emulator.world import (
 )
 from hil.wire.cdr import write_placement
 from hil.wire.command_layout import write_truth
+from hil.wire.drive_layout import read_drive
 from hil.wire.frame_layout import write_frame_head
 from hil.wire.odometry_layout import write_odometry
 from hil.wire.records import Odometry as ToldOdometry
@@ -64,10 +65,23 @@ def advance_world(
 
 @entry
 def command_robot(
-    world: Rows[World], lab: Rows[Lab], robots: Rows[Robot], k: int, wanted: Motion, now_ns: int
-) -> None:
-    """Give the k-th robot a command now."""
-    store(world, 0, commanded(load(World, world, 0), load(Lab, lab, 0), borrowed(robots), k, wanted, now_ns))
+    worlds: Rows[World],
+    labs: Rows[Lab],
+    robots: Rows[Robot],
+    k: int,
+    payload: bytes,
+    stamped: bool,
+    now_ns: int,
+) -> bool:
+    """Give the k-th robot a drive command now, or once all are stopped to stand still; whether it is one."""
+    world, drive = load(World, worlds, 0), read_drive(payload, stamped)
+    wanted = Motion(drive.v, drive.u)
+    if world.stopped:
+        wanted = Motion(0.0, 0.0)
+    elif not drive.sound:
+        return False
+    store(worlds, 0, commanded(world, load(Lab, labs, 0), borrowed(robots), k, wanted, now_ns))
+    return True
 
 
 @entry

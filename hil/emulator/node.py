@@ -7,12 +7,9 @@ run has one, recorder have reported that they are well, and a command has reache
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import partial
 
-from msgspec import Struct, field
-from msgspec.structs import replace
-
-from formation.pose import STANDSTILL
 from hil.emulator.lab_writer import LabWriter
 from hil.emulator.mocap import whole_ns
 from hil.emulator.plant import Plant
@@ -25,7 +22,6 @@ from hil.scenario.schema import Scenario
 from hil.scenario.start import chain_poses
 from hil.wire import message_types as msg
 from hil.wire import topics
-from hil.wire.drive_message import read_drive
 from hil.wire.events import Event
 from hil.wire.messages import MalformedPayloadError, decode_as
 from hil.wire.topics import link_topics
@@ -35,8 +31,9 @@ _NS = 1e-9
 _DIAGNOSTICS_NS = 500_000_000
 
 
-class EmulatorState(Struct, frozen=True):
-    """The lab, which changes in place, when its next thing is due, and what the node knows besides.
+@dataclass(slots=True, eq=False)
+class EmulatorState:
+    """The lab, when its next thing is due, and what the node knows besides; it changes in place.
 
     ``alive``: nodes that have reported to be well. ``commanded``: followers that have had a command, by
     their place. ``orders``: how many orders to change sides were given.
@@ -63,7 +60,7 @@ class EmulatorState(Struct, frozen=True):
 
 
 class EmulatorNode:
-    """Pure step of the emulator daemon.
+    """Step of the emulator daemon.
 
     ``needs``: the daemons that the start barrier waits for; where these host a node for each follower of a
     chain, all of them.
@@ -84,7 +81,7 @@ class EmulatorNode:
         self.poses = chain_poses(scenario, len(self.names))
         self.delayed = whole_ns(scenario.robot.odometry_delay_s) > 0
         self.orders = ordered_sides(scenario)
-        self._handlers: dict[str, Callable[[EmulatorState, bytes, int], EmulatorState]] = {
+        self._handlers: dict[str, Callable[[EmulatorState, bytes, int], None]] = {
             **{pair.cmd_vel: partial(self._on_command, k) for k, pair in enumerate(self.pairs, start=1)},
             topics.STOP: self._on_stop,
             topics.DIAGNOSTICS: self._on_diagnostics,
@@ -108,73 +105,68 @@ class EmulatorNode:
         The robots move from one thing that matters to them to the next, so that it makes no difference how
         often a node is called in between.
         """
-        state, out = self._catch_up(state, now_ns)
+        out = self._catch_up(state, now_ns) if state.due_ns <= now_ns else ()
         handler = self._handlers.get(event.topic)
-        if handler is None:
-            return state, out
-        try:
-            return handler(state, event.payload, now_ns), out
-        except MalformedPayloadError:
-            return replace(state, refused=counted(state.refused, "malformed")), out
+        if handler is not None:
+            try:
+                handler(state, event.payload, now_ns)
+            except MalformedPayloadError:
+                state.refused = counted(state.refused, "malformed")
+        return state, out
 
-    def _on_command(self, place: int, state: EmulatorState, payload: bytes, now_ns: int) -> EmulatorState:
-        stopped = state.plant.stopped
-        wanted = STANDSTILL if stopped else read_drive(payload, stamped=self.topics.stamped)
-        state.plant.command(place, wanted, now_ns)
-        if place in state.commanded:
-            return state
-        return self._readied(replace(state, commanded=state.commanded | {place}))
+    def _on_command(self, place: int, state: EmulatorState, payload: bytes, now_ns: int) -> None:
+        state.plant.command(place, payload, now_ns)
+        if place not in state.commanded:
+            state.commanded |= {place}
+            self._get_ready(state)
 
-    def _on_stop(self, state: EmulatorState, payload: bytes, now_ns: int) -> EmulatorState:
+    def _on_stop(self, state: EmulatorState, payload: bytes, now_ns: int) -> None:
         state.plant.halt(now_ns)
-        return state
 
-    def _on_diagnostics(self, state: EmulatorState, payload: bytes, now_ns: int) -> EmulatorState:
+    def _on_diagnostics(self, state: EmulatorState, payload: bytes, now_ns: int) -> None:
         report = decode_as(payload, msg.DiagnosticArray)
         well = {status.name.removeprefix("abreast/") for status in report.status if status.level == 0}
-        return self._readied(replace(state, alive=state.alive | (well & self.needs)))
+        state.alive |= well & self.needs
+        self._get_ready(state)
 
-    def _readied(self, state: EmulatorState) -> EmulatorState:
+    def _get_ready(self, state: EmulatorState) -> None:
         """Open the start barrier once all are alive and commanded."""
         if len(state.commanded) == len(self.pairs) and state.alive >= self.needs:
             state.plant.let_go()
-        return state
 
-    def _catch_up(self, state: EmulatorState, now_ns: int) -> tuple[EmulatorState, tuple[Outgoing, ...]]:
+    def _catch_up(self, state: EmulatorState, now_ns: int) -> tuple[Outgoing, ...]:
         """Do everything that was due until now, in the order in which it was."""
         out: list[Outgoing] = []
         while state.due_ns <= now_ns:
             happened = state.plant.advance(now_ns)
             if happened.kind == NOTHING:
                 break
-            state = replace(state, due_ns=happened.due_ns)
+            state.due_ns = happened.due_ns
             if happened.kind == CAPTURE:
-                state = self._tell_truth(state, happened, out)
+                self._tell_truth(state, happened, out)
             elif happened.kind == FRAME:
                 seen = (happened.slot, happened.stamp_ns, happened.number, happened.at_ns)
                 out.append(self.writer.frame(state.plant, *seen))
             else:
                 self._tell_odometry(state.plant, happened, out)
-        return state, tuple(out)
+        return tuple(out)
 
-    def _tell_truth(self, state: EmulatorState, happened: Happened, out: list[Outgoing]) -> EmulatorState:
+    def _tell_truth(self, state: EmulatorState, happened: Happened, out: list[Outgoing]) -> None:
         """Publish the truth of a capture, and what goes with it: an operator's order, a report."""
         at_ns, number, since_ns = happened.at_ns, happened.number, state.plant.motion_since_ns
         out += self.writer.truths(state.plant, at_ns, number)
         if self.orders and since_ns >= 0 and not state.plant.stopped:
-            state = self._order(state, (at_ns - since_ns) * _NS, at_ns, out)
+            self._order(state, (at_ns - since_ns) * _NS, at_ns, out)
         if at_ns >= state.next_diagnostics_ns or at_ns == since_ns:
             out.append(self.report(state, at_ns))
-            state = replace(state, next_diagnostics_ns=at_ns + _DIAGNOSTICS_NS)
-        return state
+            state.next_diagnostics_ns = at_ns + _DIAGNOSTICS_NS
 
-    def _order(self, state: EmulatorState, t: float, at_ns: int, out: list[Outgoing]) -> EmulatorState:
+    def _order(self, state: EmulatorState, t: float, at_ns: int, out: list[Outgoing]) -> None:
         """Tell the follower to go to the other side when the scenario says so, as an operator would."""
         while state.orders < len(self.orders) and t >= self.orders[state.orders][0]:
             order = msg.String(data=self.orders[state.orders][1].value)
-            state = replace(state, orders=state.orders + 1)
+            state.orders += 1
             out.append(outgoing(self.topics.side, order, at_ns))
-        return state
 
     def _tell_odometry(self, plant: Plant, happened: Happened, out: list[Outgoing]) -> None:
         """Publish odometry that arrives, without delay at the sample itself, and what the leader drives."""

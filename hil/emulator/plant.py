@@ -38,6 +38,9 @@ from hil.emulator.world import (
 )
 from hil.scenario.parts import leader_program
 from hil.scenario.schema import Scenario
+from hil.wire.drive_message import drive_type
+from hil.wire.messages import MalformedPayloadError, in_little_endian
+from hil.wire.topics import topics_of
 
 _ROOM = 16
 
@@ -120,6 +123,8 @@ class Plant:
         self._seed, self._robots = scenario.run.seed, len(poses)
         self._lab, self._world = row_of(lab_of(scenario)), row_of(world_at(begun_ns))
         self._now = columns_of(self._world)
+        self._stamped = topics_of(scenario).stamped
+        self._drive_type = drive_type(stamped=self._stamped)
         self.memory = memory_of(scenario, poses)
 
     def advance(self, until_ns: int) -> Happened:
@@ -133,9 +138,15 @@ class Plant:
             else:
                 return happened
 
-    def command(self, k: int, wanted: Motion, now_ns: int) -> None:
-        """Give the k-th robot a command now."""
-        command_robot(self._world, self._lab, self.memory.robots, k, wanted, now_ns)
+    def command(self, k: int, payload: bytes, now_ns: int) -> None:
+        """Give the k-th robot a drive command now; once all are stopped, whatever it says, to stand still.
+
+        Raises :class:`~hil.wire.messages.MalformedPayloadError` for a payload that is none.
+        """
+        whole = in_little_endian(payload, self._drive_type)
+        robots, stamped = self.memory.robots, self._stamped
+        if not command_robot(self._world, self._lab, robots, k, whole, stamped, now_ns):
+            raise MalformedPayloadError(f"{len(payload)} bytes, expected a {self._drive_type}")
 
     def halt(self, now_ns: int) -> None:
         """Stop all robots now, for good."""

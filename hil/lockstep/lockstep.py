@@ -47,8 +47,8 @@ class Lockstep:
                 self.now_ns = end_ns
                 return
             self.now_ns = max(self.now_ns, first)
-            index = dues.index(first)
-            self._deliver(self._step(index, TICK))
+            if messages := self._step(dues.index(first), TICK):
+                self._deliver(messages)
 
     def publish(self, message: Outgoing) -> None:
         """Send a message from outside, as an operator would."""
@@ -64,10 +64,11 @@ class Lockstep:
         return out
 
     def _deliver(self, messages: tuple[Outgoing, ...]) -> None:
-        waiting = deque(messages)
+        waiting, now_ns = deque(messages), self.now_ns
         while waiting:
             message = waiting.popleft()
-            self.sink(message, self.now_ns)
-            event = Event(message.topic, message.payload)
-            for index in self._readers.get(message.topic, ()):
-                waiting.extend(self._step(index, event))
+            self.sink(message, now_ns)
+            if readers := self._readers.get(message.topic):
+                event = Event(message.topic, message.payload)
+                for index in readers:
+                    waiting.extend(self._step(index, event))

@@ -2,68 +2,91 @@
 
 from __future__ import annotations
 
-from msgspec import Struct, field
-from msgspec.structs import replace
+from typing import cast
 
 from controllers.follower import Command
 from controllers.station_keeper import StationState, at_station
 from estimation.tracking.prediction import SentCommand, Sight, rows_for
 from estimation.tracking.tracker import Status
-from formation.pose import Motion
-from formation.records import Rows, columns_of, copy_of, load, row_of, rows_of
+from formation.kernel import compiles
+from formation.records import Rows, columns_of, copy_of, lent, load, row_of, rows_of, store
 from formation.ring import place
 from formation.station import Side
-from hil.nodes.command_writer import CommandWriter
 from hil.nodes.control_rules import control_rules
-from hil.nodes.controller_entries import NO_REPORT, ControlEvent, Happening, Outcome, hear_estimate
-from hil.nodes.controller_entries import control as control_step
-from hil.nodes.controller_step import ControlState, begun
-from hil.nodes.leader_turn import SOURCES, TurnSource
-from hil.nodes.node import (
-    Counts,
-    Outgoing,
-    consumed,
-    counted,
-    diagnostics,
-    is_due,
-    named_counts,
-    no_counts,
-    outgoing,
+from hil.nodes.controller_desk import (
+    COUNTED,
+    DECISIONS,
+    DRIVING,
+    MALFORMED,
+    REFUSALS,
+    STOPS,
+    UNKNOWN_SIDE,
+    Desk,
+    NodeRules,
+    Notes,
 )
+from hil.nodes.controller_entries import control, hear, hear_estimate, refuse
+from hil.nodes.controller_events import NOTHING, STOP, TICK, ControlEvent, Happening, happened
+from hil.nodes.controller_step import ControlState, begun
+from hil.nodes.counting import Count, counts_in
+from hil.nodes.leader_turn import SOURCES, TurnSource
+from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
-from hil.wire.drive_message import read_drive
+from hil.wire.cdr import packed_texts
+from hil.wire.drive_message import drive_type, read_drive
 from hil.wire.events import Event
 from hil.wire.messages import MalformedPayloadError, decode_as, in_little_endian, typename_of
 from hil.wire.records import Receipt
+from hil.wire.templates import command_template, drive_template
 from hil.wire.topics import topics_of
-from hil.wire.writing import MOST_RECEIPTS, DriveWriter
+from hil.wire.writing import MOST_RECEIPTS
 
 NAME = "controller"
 _DIAGNOSTICS_NS = 500_000_000
 _COMMAND, _ESTIMATE = typename_of(msg.Command), typename_of(msg.LeaderEstimate)
-_CAUSES = {Outcome.BAD_STAMP.value: "bad_stamp", Outcome.UNSAFE_ORDER.value: "unsafe_side_change"}
+_STOPS = packed_texts(["", *STOPS])
 
 
-class ControllerState(Struct, frozen=True):
-    """All that the controller remembers.
+class ControllerState:
+    """All that the controller remembers; it changes in place.
 
-    ``control`` (1,) and ``commands``, those on their way: rows that no step writes to, each has its own.
+    ``desk``: rows with all but when the next report is due.
     """
 
-    control: Rows[ControlState]
-    commands: Rows[SentCommand]
-    receipts: tuple[Receipt, ...] = ()
-    refused: Counts = field(default_factory=no_counts)
-    decided: Counts = field(default_factory=no_counts)
-    next_diagnostics_ns: int = 0
+    __slots__ = ("_due_ns", "desk", "lent", "next_diagnostics_ns")
+
+    def __init__(self, desk: Desk, next_diagnostics_ns: int) -> None:
+        self.desk = desk
+        self.lent = lent(desk) if compiles() else cast("Rows[Desk]", [desk])
+        self.next_diagnostics_ns = next_diagnostics_ns
+        self._due_ns = columns_of(desk.control)["next_tick_ns"]
+
+    def copy(self) -> ControllerState:
+        """The same state, to go on from twice."""
+        desk = self.desk
+        kept = desk._replace(
+            control=copy_of(desk.control),
+            commands=copy_of(desk.commands),
+            notes=copy_of(desk.notes),
+            receipts=copy_of(desk.receipts),
+            counts=copy_of(desk.counts),
+            event=copy_of(desk.event),
+            result=copy_of(desk.result),
+        )
+        return ControllerState(kept, self.next_diagnostics_ns)
+
+    def due_ns(self) -> int:
+        """When the next command is due."""
+        due_ns: int = self._due_ns.item(0)
+        return due_ns
 
     @property
     def known(self) -> ControlState:
         """What is known of estimates, orders and the last command."""
-        return load(ControlState, self.control, 0)
+        return load(ControlState, self.desk.control, 0)
 
     @property
     def stopped(self) -> bool:
@@ -84,13 +107,28 @@ class ControllerState(Struct, frozen=True):
     @property
     def sent(self) -> tuple[SentCommand, ...]:
         """Commands since the capture of that, oldest first, and the one before."""
-        sent = self.known.sent
-        places = [place(sent, self.commands, k) for k in range(sent.length)]
-        return tuple(load(SentCommand, self.commands, k) for k in places)
+        sent, commands = self.known.sent, self.desk.commands
+        return tuple(load(SentCommand, commands, place(sent, commands, k)) for k in range(sent.length))
+
+    @property
+    def receipts(self) -> tuple[Receipt, ...]:
+        """Inputs since the last decision."""
+        count = load(Notes, self.desk.notes, 0).receipts
+        return tuple(load(Receipt, self.desk.receipts, k) for k in range(count))
+
+    @property
+    def refused(self) -> Counts:
+        """Inputs that were not used, by cause."""
+        return counts_in(self.desk.counts, REFUSALS)
+
+    @property
+    def decided(self) -> Counts:
+        """How often the robot was driven, or stopped and why."""
+        return counts_in(self.desk.counts, DECISIONS, DRIVING)
 
 
 class ControllerNode:
-    """Pure step of the controller of one follower.
+    """Step of the controller of one follower.
 
     ``may_change``: whether it takes orders to change sides; in a chain others may be where it would go.
     """
@@ -98,80 +136,78 @@ class ControllerNode:
     def __init__(self, scenario: Scenario, name: str = NAME, *, may_change: bool = True) -> None:
         self.name = name
         self.topics = topics_of(scenario)
-        self.rules = row_of(control_rules(scenario))
+        follower, stamped = self.topics.follower, self.topics.stamped
+        self.decision = command_template(follower, MOST_RECEIPTS)
+        self.drive = drive_template(follower, stamped=stamped)
+        places = self.decision.numbers_at, self.drive.numbers_at
+        self.rules = row_of(NodeRules(control_rules(scenario), *places))
         self.station = station(scenario)
-        self.writer = CommandWriter(self.topics.follower)
-        self.driver = DriveWriter(self.topics.follower, stamped=self.topics.stamped)
         self.rows = rows_for(scenario.controller.max_age_s + scenario.controller.transport_s)
         is_told = SOURCES[scenario.controller.law] is TurnSource.TOLD
         leader = (self.topics.leader_cmd_vel,) if is_told else ()
         orders = (self.topics.side,) if may_change else ()
         self.subscribes: tuple[str, ...] = (self.topics.estimate, topics.STOP, *leader, *orders)
+        self._drive_type = drive_type(stamped=stamped)
 
     def begin(self, now_ns: int) -> ControllerState:
         """State of a controller that has heard nothing: it keeps the robot still."""
-        control = row_of(begun(at_station(self.station), now_ns))
-        return ControllerState(control, rows_of(SentCommand, self.rows), next_diagnostics_ns=now_ns)
+        desk = Desk(
+            rules=self.rules,
+            control=row_of(begun(at_station(self.station), now_ns)),
+            commands=rows_of(SentCommand, self.rows),
+            notes=rows_of(Notes, 1),
+            receipts=rows_of(Receipt, MOST_RECEIPTS),
+            counts=rows_of(Count, COUNTED),
+            event=row_of(TICK),
+            result=rows_of(Command, 1),
+            decision=self.decision.buffer,
+            drive=self.drive.buffer,
+        )
+        return ControllerState(desk, now_ns)
 
     def due_ns(self, state: ControllerState) -> int:
         """Time of the next tick: a command leaves at least that often."""
-        return int(columns_of(state.control)["next_tick_ns"][0])
+        return state.due_ns()
 
     def step(
         self, state: ControllerState, event: Event, now_ns: int
     ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
         """Take in an estimate, a stop or a tick; each leads to a command."""
-        if event.topic:
-            receipts = (*state.receipts, consumed(event, now_ns))[-MOST_RECEIPTS:]
-            state = replace(state, receipts=receipts)
-        happened, cause = self._read(event)
-        state = replace(state, control=copy_of(state.control), commands=copy_of(state.commands))
-        result = rows_of(Command, 1)
-        outcome = control_step(state.control, self.rules, state.commands, happened, result, now_ns)
-        if cause := cause or _CAUSES.get(outcome, ""):
-            return replace(state, refused=counted(state.refused, cause)), ()
-        if outcome != Outcome.COMMAND:
+        topic = event.topic
+        if topic == self.topics.estimate:
+            whole = in_little_endian(event.payload, _ESTIMATE)
+            if not hear_estimate(state.lent, whole, event.signed_digest, now_ns):
+                refuse(state.lent, MALFORMED)
+        elif topic:
+            hear(state.lent, event.signed_digest, now_ns)
+            store(state.desk.event, 0, self._read(state, event))
+        else:
+            store(state.desk.event, 0, TICK)
+        length = control(state.lent, _STOPS, now_ns)
+        if not length:
             return state, ()
-        command = load(Command, result, 0)
-        fresh = bool(columns_of(happened)["status"][0] == Status.TRACKING)
-        record = self.writer.write(state.control, result, state.receipts, now_ns, fresh=fresh)
-        drive = self.driver.write(Motion(command.v, command.u), now_ns)
-        out = (
-            Outgoing(self.topics.cmd_vel, self.driver.typename, drive, now_ns),
-            Outgoing(self.topics.command, _COMMAND, record, now_ns),
-        )
-        word = command.stop.value if command.stop else "driving"
-        return self._speak(replace(state, receipts=(), decided=counted(state.decided, word)), out, now_ns)
+        decision = Outgoing(self.topics.command, _COMMAND, self.decision.payload(length), now_ns)
+        drive = Outgoing(self.topics.cmd_vel, self._drive_type, self.drive.buffer.tobytes(), now_ns)
+        if not is_due(state.next_diagnostics_ns, _DIAGNOSTICS_NS, now_ns):
+            return state, (drive, decision)
+        state.next_diagnostics_ns = now_ns + _DIAGNOSTICS_NS
+        return state, (drive, decision, self.report(state, now_ns))
 
-    def _read(self, event: Event) -> tuple[Rows[ControlEvent], str]:
-        """What an event says, or that it is nothing and by what cause."""
-        if not event.topic:
-            return _TICK, ""
-        if event.topic == self.topics.estimate:
-            heard, whole = rows_of(ControlEvent, 1), in_little_endian(event.payload, _ESTIMATE)
-            return (heard, "") if hear_estimate(whole, heard) else (_NOTHING, "malformed")
+    def _read(self, state: ControllerState, event: Event) -> ControlEvent:
+        """What a message says that is no estimate; what cannot be read says nothing, and is counted."""
         if event.topic == topics.STOP:
-            return _happened(Happening.STOP), ""
+            return STOP
         try:
             if event.topic == self.topics.leader_cmd_vel:
-                told = read_drive(event.payload, stamped=self.topics.stamped)
-                return _happened(Happening.LEADER, told.u), ""
+                return happened(Happening.LEADER, read_drive(event.payload, stamped=self.topics.stamped).u)
             if event.topic == self.topics.side:
                 word = decode_as(event.payload, msg.String).data
-                return _happened(Happening.ORDER, Side(word).sign), ""
+                return happened(Happening.ORDER, Side(word).sign)
         except MalformedPayloadError:
-            return _NOTHING, "malformed"
+            refuse(state.lent, MALFORMED)
         except ValueError:
-            return _NOTHING, "unknown_side"
-        return _NOTHING, ""
-
-    def _speak(
-        self, state: ControllerState, out: tuple[Outgoing, ...], now_ns: int
-    ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
-        if not is_due(state.next_diagnostics_ns, _DIAGNOSTICS_NS, now_ns):
-            return state, out
-        state = replace(state, next_diagnostics_ns=now_ns + _DIAGNOSTICS_NS)
-        return state, (*out, self.report(state, now_ns))
+            refuse(state.lent, UNKNOWN_SIDE)
+        return NOTHING
 
     def report(self, state: ControllerState, now_ns: int) -> Outgoing:
         """Diagnostics: what was decided how often, and what was refused."""
@@ -181,13 +217,6 @@ class ControllerNode:
         values |= _side_report(known.follower.station)
         values |= named_counts("decided", state.decided) | named_counts("refused", state.refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
-
-
-def _happened(kind: Happening, number: float = 0.0) -> Rows[ControlEvent]:
-    return row_of(ControlEvent(kind.value, 0, number, NO_REPORT))
-
-
-_TICK, _NOTHING = _happened(Happening.TICK), _happened(Happening.NOTHING)
 
 
 def _side_report(station: StationState) -> dict[str, object]:

@@ -1,15 +1,21 @@
-"""A step of the controller, compiled: by one call from what a message says to the command."""
+"""A step of the controller, compiled: what Python enters once or twice for everything that happens.
+
+What happens is put down first, an estimate by :func:`hear_estimate`; then :func:`control` decides. All work
+on the node's :class:`hil.nodes.controller_desk.Desk`, in a row (1,).
+"""
 
 from __future__ import annotations
 
-from enum import IntEnum
 from typing import NamedTuple
 
 from controllers.follower import Command
-from estimation.tracking.prediction import Reported, SentCommand
+from estimation.tracking.prediction import Reported
 from formation.kernel import entry, kernel
-from formation.records import Buffer, Rows, borrowed, load, read_float, store
+from formation.records import Rows, load, read_float, store
+from hil.nodes.controller_desk import BAD_STAMP, DRIVING, UNSAFE_SIDE_CHANGE, Desk, NodeRules, Notes
+from hil.nodes.controller_events import NOTHING, ControlEvent, Happening
 from hil.nodes.controller_step import (
+    TRACKING,
     ControlRules,
     ControlState,
     at_time,
@@ -20,55 +26,23 @@ from hil.nodes.controller_step import (
     heard_order,
     heard_stop,
 )
+from hil.nodes.counting import count
+from hil.nodes.receipt_list import with_receipt
 from hil.wire.command_layout import write_command
+from hil.wire.drive_layout import write_drive
 from hil.wire.estimate_layout import read_estimate
 from hil.wire.message_checks import is_estimate
-from hil.wire.records import CommandNumbers, ReadEstimate, Receipt
-
-
-class Happening(IntEnum):
-    """What happens to a controller."""
-
-    NOTHING = 0
-    TICK = 1
-    ESTIMATE = 2
-    STOP = 3
-    LEADER = 4
-    ORDER = 5
-
-
-class Outcome(IntEnum):
-    """What comes of it."""
-
-    NO_COMMAND = 0
-    COMMAND = 1
-    BAD_STAMP = 2
-    UNSAFE_ORDER = 3
-
-
-class ControlEvent(NamedTuple):
-    """What happens, in numbers.
-
-    ``kind``: a :class:`Happening`. ``reported`` and ``status``: of an estimate. ``number``: the leader's turn
-    rate [rad/s], or the sign of the side that is ordered.
-    """
-
-    kind: int
-    status: int
-    number: float
-    reported: Reported
-
-
-NO_REPORT = Reported(0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+from hil.wire.records import CommandNumbers, ReadEstimate
 
 _VAR_U1_BYTES = 24 * 8
 _TICK, _ESTIMATE, _STOP = Happening.TICK.value, Happening.ESTIMATE.value, Happening.STOP.value
 _LEADER, _ORDER = Happening.LEADER.value, Happening.ORDER.value
-_NO_COMMAND, _COMMAND = Outcome.NO_COMMAND.value, Outcome.COMMAND.value
-_BAD_STAMP, _UNSAFE_ORDER = Outcome.BAD_STAMP.value, Outcome.UNSAFE_ORDER.value
+_COMMANDS, _MOVES_NOBODY = -1, -2
 
 
 class _Taken(NamedTuple):
+    """State with an event in it, and what comes of that: _COMMANDS, _MOVES_NOBODY, or why it is refused."""
+
     state: ControlState
     outcome: int
 
@@ -79,16 +53,16 @@ def _taken(state: ControlState, rules: ControlRules, event: ControlEvent, now_ns
     state = at_time(state, now_ns)
     if event.kind == _ESTIMATE:
         if not can_be(event.reported, now_ns):
-            return _Taken(state, _BAD_STAMP)
-        return _Taken(heard_estimate(state, rules, event.reported, event.status, now_ns), _COMMAND)
+            return _Taken(state, BAD_STAMP)
+        return _Taken(heard_estimate(state, rules, event.reported, event.status, now_ns), _COMMANDS)
     if event.kind == _STOP:
-        return _Taken(heard_stop(state), _COMMAND)
+        return _Taken(heard_stop(state), _COMMANDS)
     if event.kind == _LEADER:
-        return _Taken(heard_leader(state, event.number), _NO_COMMAND)
+        return _Taken(heard_leader(state, event.number), _MOVES_NOBODY)
     if event.kind == _ORDER:
         ordered = heard_order(state, rules, event.number)
-        return _Taken(ordered.state, _NO_COMMAND if ordered.taken else _UNSAFE_ORDER)
-    return _Taken(state, _COMMAND if event.kind == _TICK else _NO_COMMAND)
+        return _Taken(ordered.state, _MOVES_NOBODY if ordered.taken else UNSAFE_SIDE_CHANGE)
+    return _Taken(state, _COMMANDS if event.kind == _TICK else _MOVES_NOBODY)
 
 
 @kernel
@@ -98,35 +72,16 @@ def _reported(payload: bytes, read: ReadEstimate) -> Reported:
     return Reported(n.capture_ns, n.measured_ns, n.rho, n.alpha2, n.v1, n.alpha1, n.u1, var_u1, n.v2, n.u2)
 
 
-@entry
-def hear_estimate(payload: bytes, events: Rows[ControlEvent]) -> bool:
-    """Read an estimate into ``events`` (1,); whether it is one."""
-    read = read_estimate(payload)
-    if not is_estimate(read):
-        return False
-    event = ControlEvent(_ESTIMATE, read.numbers.status, 0.0, _reported(payload, read))
-    store(borrowed(events), 0, event)
-    return True
+@kernel
+def _noted(desk: Desk, digest: int, now_ns: int) -> None:
+    notes = load(Notes, desk.notes, 0)
+    store(desk.notes, 0, Notes(with_receipt(desk.receipts, notes.receipts, digest, now_ns)))
 
 
-@entry
-def tell_command(
-    buffer: Buffer,
-    times_at: int,
-    stops: bytes,
-    states: Rows[ControlState],
-    results: Rows[Command],
-    receipts: Rows[Receipt],
-    consumed: int,
-    fresh: bool,
-    now_ns: int,
-) -> int:
-    """Fill :func:`hil.wire.templates.command_template` with the command in ``results``; returns the length.
-
-    ``states``: that of the controller after it. ``stops``: texts of the reasons to stand still, by their
-    code. ``consumed``: how many of the receipts are meant.
-    """
-    state, told = load(ControlState, borrowed(states), 0), load(Command, borrowed(results), 0)
+@kernel
+def _written(desk: Desk, state: ControlState, told: Command, fresh: bool, stops: bytes, now_ns: int) -> int:
+    """Write a decision and its drive command, with the state after it; the length of the former."""
+    rules, notes = load(NodeRules, desk.rules, 0), load(Notes, desk.notes, 0)
     capture_ns, measured_ns = 0, 0
     if state.known:
         capture_ns, measured_ns = state.sight.capture_ns, state.sight.measured_ns
@@ -135,7 +90,7 @@ def tell_command(
         capture_ns,
         measured_ns,
         told.reason,
-        consumed,
+        notes.receipts,
         told.v,
         told.u,
         told.v_wanted,
@@ -143,28 +98,52 @@ def tell_command(
         told.saturated,
         fresh,
     )
-    return write_command(buffer, times_at, stops, numbers, borrowed(receipts))
+    store(desk.notes, 0, Notes(0))
+    write_drive(desk.drive, rules.twist_at, now_ns, told.v, told.u)
+    return write_command(desk.decision, rules.times_at, stops, numbers, desk.receipts)
 
 
 @entry
-def control(
-    states: Rows[ControlState],
-    rules: Rows[ControlRules],
-    commands: Rows[SentCommand],
-    events: Rows[ControlEvent],
-    results: Rows[Command],
-    now_ns: int,
-) -> int:
-    """Step of a controller with the event in ``events`` (1,); an :class:`Outcome`.
+def hear(desks: Rows[Desk], digest: int, now_ns: int) -> None:
+    """Note the receipt of a message that is no estimate."""
+    _noted(load(Desk, desks, 0), digest, now_ns)
 
-    ``states`` (1,) and ``commands``, those on their way, change; a command is put into ``results`` (1,).
+
+@entry
+def refuse(desks: Rows[Desk], cause: int) -> None:
+    """Count an input that is not used, by its cause."""
+    count(load(Desk, desks, 0).counts, cause)
+
+
+@entry
+def hear_estimate(desks: Rows[Desk], payload: bytes, digest: int, now_ns: int) -> bool:
+    """Put an estimate down as what has happened, and nothing if it is none; whether it is one."""
+    desk = load(Desk, desks, 0)
+    _noted(desk, digest, now_ns)
+    read = read_estimate(payload)
+    if not is_estimate(read):
+        store(desk.event, 0, NOTHING)
+        return False
+    store(desk.event, 0, ControlEvent(_ESTIMATE, read.numbers.status, 0.0, _reported(payload, read)))
+    return True
+
+
+@entry
+def control(desks: Rows[Desk], stops: bytes, now_ns: int) -> int:
+    """Step of a controller with what has happened; the length of its decision's message, 0 for none.
+
+    ``stops``: texts of the reasons to stand still, by their code.
     """
-    kept, by = borrowed(states), load(ControlRules, borrowed(rules), 0)
-    taken = _taken(load(ControlState, kept, 0), by, load(ControlEvent, borrowed(events), 0), now_ns)
-    if taken.outcome != _COMMAND:
-        store(kept, 0, taken.state)
-        return taken.outcome
-    controlled = commanded(taken.state, by, borrowed(commands), now_ns)
-    store(kept, 0, controlled.state)
-    store(borrowed(results), 0, controlled.command)
-    return taken.outcome
+    desk = load(Desk, desks, 0)
+    rules, event = load(NodeRules, desk.rules, 0).control, load(ControlEvent, desk.event, 0)
+    taken = _taken(load(ControlState, desk.control, 0), rules, event, now_ns)
+    if taken.outcome != _COMMANDS:
+        store(desk.control, 0, taken.state)
+        if taken.outcome >= 0:
+            count(desk.counts, taken.outcome)
+        return 0
+    controlled = commanded(taken.state, rules, desk.commands, now_ns)
+    store(desk.control, 0, controlled.state)
+    store(desk.result, 0, controlled.command)
+    count(desk.counts, DRIVING + controlled.command.reason)
+    return _written(desk, controlled.state, controlled.command, event.status == TRACKING, stops, now_ns)

@@ -72,12 +72,12 @@ class EstimatorState:
     @property
     def taken(self) -> Counts:
         """Inputs that were used, by kind."""
-        return self.memory.counts()[0]
+        return self.memory.taken
 
     @property
     def refused(self) -> Counts:
         """Inputs that were not used, by cause."""
-        return self.memory.counts()[1]
+        return self.memory.refused
 
 
 class EstimatorNode:
@@ -131,13 +131,13 @@ class EstimatorNode:
         if came != SEEN and not self._is_seen(state, came):
             return 0
         if self.aligns:
-            shown = memory.shown
-            watch = reconsidered(with_pose(state.watch, shown.capture_ns, shown.seen.follower), now_ns)
+            frame = memory.frame
+            watch = reconsidered(with_pose(state.watch, frame.capture_ns, frame.seen.follower), now_ns)
             memory.correct(watch.applied)
             state.watch = watch
         length = memory.take_frame(now_ns)
         if self.certifying is not None and memory.notes.verdict not in _UNUSED:
-            capture_ns, seen = memory.shown
+            capture_ns, seen = memory.frame
             leader = (seen.leader_x, seen.leader_y)
             state.believed = self.certifying.heard_frame(state.believed, capture_ns, leader, seen.follower)
         return length
@@ -206,6 +206,5 @@ class EstimatorNode:
         )
         if self.aligns:
             values |= {f"odometry.{name}": value for name, value in state.watch.applied._asdict().items()}
-        taken, refused = state.memory.counts()
-        values |= named_counts("taken", taken) | named_counts("refused", refused)
+        values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)

@@ -12,11 +12,12 @@ from estimation.time.host_time import NO_TIME_YET, HostTime, TimeRows
 from estimation.tracking.estimate import Estimate
 from estimation.tracking.track_point import TrackPoint
 from formation.kernel import kernel
-from formation.records import Buffer, Rows, load, size, store
+from formation.records import Buffer, Rows, load, store
 from formation.ring import EMPTY
+from hil.nodes.counting import Count
 from hil.nodes.estimator_step import Known, Memory, Rules
 from hil.nodes.frame_time import TimeRules
-from hil.nodes.refusals import Count
+from hil.nodes.receipt_list import with_receipt
 from hil.wire.assumed_errors import AssumedErrors
 from hil.wire.records import Body, FrameHead, Receipt, Sighting, Wanted
 
@@ -46,7 +47,7 @@ class NodeRules(NamedTuple):
     times_at: int
 
 
-class Shown(NamedTuple):
+class TimedFrame(NamedTuple):
     """A mocap frame, captured at a time by the host's clock."""
 
     capture_ns: int
@@ -76,7 +77,7 @@ NOTHING_NOTED = Notes(NO_TIME_YET, 0, 0, 0, 0, 0, False)
 class Desk(NamedTuple):
     """Rows of a node: (1,) but for tracks, odometry, clock, receipts, counts and bodies.
 
-    ``shown``, ``sample``, ``sighting``: the newest input, read and checked. ``newest``: the last estimate.
+    ``frame``, ``sample``, ``sighting``: the newest input, read and checked. ``newest``: the last estimate.
     ``buffer``: its message. ``heads``, ``bodies``, ``wanted``: as a frame is read.
     """
 
@@ -89,7 +90,7 @@ class Desk(NamedTuple):
     notes: Rows[Notes]
     receipts: Rows[Receipt]
     counts: Rows[Count]
-    shown: Rows[Shown]
+    frame: Rows[TimedFrame]
     sample: Rows[MotionSample]
     sighting: Rows[Sighting]
     newest: Rows[Estimate]
@@ -108,14 +109,9 @@ class Desk(NamedTuple):
 def noted(desk: Desk, digest: int, now_ns: int) -> bool:
     """Note an input's receipt; whether it came after the one before, or the clock was set back."""
     notes = load(Notes, desk.notes, 0)
-    count = notes.receipts
-    if count == size(desk.receipts):
-        # Odometry without any frame must not fill the memory.
-        count -= 1
-        for k in range(count):
-            store(desk.receipts, k, load(Receipt, desk.receipts, k + 1))
-    store(desk.receipts, count, Receipt(digest, now_ns))
-    store(desk.notes, 0, notes._replace(receipts=count + 1, heard_ns=now_ns))
+    # Odometry without any frame must not fill the memory.
+    count = with_receipt(desk.receipts, notes.receipts, digest, now_ns)
+    store(desk.notes, 0, notes._replace(receipts=count, heard_ns=now_ns))
     return now_ns >= notes.heard_ns - CLOCK_TOLERANCE_NS
 
 

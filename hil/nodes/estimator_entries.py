@@ -14,13 +14,15 @@ from controllers.guard import CLOCK_TOLERANCE_NS
 from estimation.models.measurement import PairSeen, from_sensor, measure_body
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE
-from estimation.tracking.tracker import COASTING, LOST, newest, status_of
+from estimation.tracking.tracker import COASTING, LOST, status_of
+from estimation.tracking.tracker import newest as newest_point
 from formation.angles import wrapped
 from formation.kernel import entry, interpreted, kernel
 from formation.pose import Pose
 from formation.records import Rows, load, store
 from hil.nodes import estimator_step as step
-from hil.nodes.estimator_desk import Desk, NodeRules, Notes, Shown, forget, forget_tracks, noted
+from hil.nodes.counting import count
+from hil.nodes.estimator_desk import Desk, NodeRules, Notes, TimedFrame, forget, forget_tracks, noted
 from hil.nodes.estimator_step import Known, Taken
 from hil.nodes.frame_time import time_of
 from hil.nodes.refusals import (
@@ -33,7 +35,6 @@ from hil.nodes.refusals import (
     TAKEN_ODOMETRY,
     TAKEN_USED,
     UNKNOWN_BODY,
-    count,
     refusal_of,
 )
 from hil.nodes.status_reasons import reason_number
@@ -71,13 +72,13 @@ def _read_frame(desk: Desk, payload: bytes, names: bytes, again: bool) -> Frame:
 
 
 @kernel(inline=False)
-def _told(desk: Desk, reasons: bytes, now_ns: int) -> int:
+def _estimated(desk: Desk, reasons: bytes, now_ns: int) -> int:
     """Put the newest estimate of a track that has one down, and its message into the buffer; its length."""
     rules, notes = load(NodeRules, desk.rules, 0), load(Notes, desk.notes, 0)
-    told = step.estimate(load(Known, desk.known, 0), desk.points, rules.step, now_ns)
-    estimate = told.estimate
+    newest = step.estimate(load(Known, desk.known, 0), desk.points, rules.step, now_ns)
+    estimate = newest.estimate
     store(desk.newest, 0, estimate)
-    reason = reason_number(estimate.status, told.cause)
+    reason = reason_number(estimate.status, newest.cause)
     numbers = told_numbers(estimate, rules.assumed, reason, notes.receipts, now_ns)
     store(desk.notes, 0, notes._replace(receipts=0, told_ns=now_ns))
     return write_told(desk.buffer, rules.times_at, reasons, numbers, estimate.joint, desk.receipts)
@@ -95,7 +96,7 @@ def _moved_on(desk: Desk, taken: Taken, reasons: bytes, now_ns: int) -> int:
         count(desk.counts, TAKEN_USED)
     if taken.late and verdict != DUPLICATE:
         count(desk.counts, TAKEN_LATE)
-    return 0 if verdict in (DUPLICATE, LATE) else _told(desk, reasons, now_ns)
+    return 0 if verdict in (DUPLICATE, LATE) else _estimated(desk, reasons, now_ns)
 
 
 @entry
@@ -124,7 +125,7 @@ def see_frame(desks: Rows[Desk], payload: bytes, names: bytes, again: bool, dige
         count(desk.counts, SAME_PLACE)
         return came
     follower = Pose(frame.follower_x, frame.follower_y, frame.follower_theta)
-    store(desk.shown, 0, Shown(timed.capture_ns, PairSeen(frame.leader_x, frame.leader_y, follower)))
+    store(desk.frame, 0, TimedFrame(timed.capture_ns, PairSeen(frame.leader_x, frame.leader_y, follower)))
     return came + SEEN
 
 
@@ -173,8 +174,8 @@ def take_frame(desks: Rows[Desk], reasons: bytes, now_ns: int) -> int:
     """Take the frame that was seen into the tracks; the length of the estimate's message, 0 for none."""
     desk = load(Desk, desks, 0)
     known, rules = load(Known, desk.known, 0), load(NodeRules, desk.rules, 0).step
-    shown = load(Shown, desk.shown, 0)
-    taken = step.take_frame(known, desk.memory(), rules, shown.capture_ns, shown.seen)
+    frame = load(TimedFrame, desk.frame, 0)
+    taken = step.take_frame(known, desk.memory(), rules, frame.capture_ns, frame.seen)
     return _moved_on(desk, taken, reasons, now_ns)
 
 
@@ -209,17 +210,17 @@ def tick(desks: Rows[Desk], reasons: bytes, now_ns: int) -> int:
     if known.track.length == 0:
         return 0
     settings = load(NodeRules, desk.rules, 0).step.settings
-    found = status_of(newest(desk.points, known.track), now_ns, settings)
+    found = status_of(newest_point(desk.points, known.track), now_ns, settings)
     missing = found in (COASTING, LOST)
     due = (now_ns - load(Notes, desk.notes, 0).told_ns) * 2 > TICK_NS
-    return _told(desk, reasons, now_ns) if missing and due else 0
+    return _estimated(desk, reasons, now_ns) if missing and due else 0
 
 
 @entry
 def status(desks: Rows[Desk], now_ns: int) -> int:
     """Status of a track that has a point, for one who looks at it now."""
     desk = load(Desk, desks, 0)
-    point = newest(desk.points, load(Known, desk.known, 0).track)
+    point = newest_point(desk.points, load(Known, desk.known, 0).track)
     return status_of(point, now_ns, load(NodeRules, desk.rules, 0).step.settings)
 
 

@@ -22,6 +22,7 @@ from estimation.tracking.tracker import Status
 from formation.kernel import compiles
 from formation.records import R, Rows, columns_of, lent, load, plain_rows_of, row_of, rows_of, store
 from formation.ring import Ring, place
+from hil.nodes.counting import Count, counts_in
 from hil.nodes.estimator_desk import (
     NOTHING_KNOWN,
     NOTHING_NOTED,
@@ -29,13 +30,13 @@ from hil.nodes.estimator_desk import (
     NodeRules,
     Notes,
     SensorRules,
-    Shown,
+    TimedFrame,
 )
 from hil.nodes.estimator_entries import COMPILED, PLAIN
 from hil.nodes.estimator_step import FUSED, MOCAP, ODOMETRY, Known, Rules, Told, estimate
 from hil.nodes.frame_time import time_rules
 from hil.nodes.node import Counts
-from hil.nodes.refusals import COUNTED, REFUSALS, TAKEN, Count
+from hil.nodes.refusals import COUNTED, REFUSALS, TAKEN, TAKEN_FRAME
 from hil.nodes.status_reasons import ALL_REASONS
 from hil.scenario.leader_model import input_trust, leader_filter, own_noise, pose_noise, track_settings
 from hil.scenario.schema import Scenario
@@ -126,7 +127,7 @@ class EstimatorMemory:
             notes=row_of(NOTHING_NOTED),
             receipts=rows_of(Receipt, MOST_RECEIPTS),
             counts=rows_of(Count, COUNTED),
-            shown=rows_of(Shown, 1),
+            frame=rows_of(TimedFrame, 1),
             sample=rows_of(MotionSample, 1),
             sighting=rows_of(Sighting, 1),
             newest=rows_of(Estimate, 1),
@@ -208,9 +209,9 @@ class EstimatorMemory:
         return load(Notes, self.desk.notes, 0)
 
     @property
-    def shown(self) -> Shown:
+    def frame(self) -> TimedFrame:
         """The frame that was seen last."""
-        return load(Shown, self.desk.shown, 0)
+        return load(TimedFrame, self.desk.frame, 0)
 
     @property
     def sample(self) -> MotionSample:
@@ -242,15 +243,15 @@ class EstimatorMemory:
         """Receipts of the inputs since the last estimate."""
         return tuple(load(Receipt, self.desk.receipts, k) for k in range(self.notes.receipts))
 
-    def counts(self) -> tuple[Counts, Counts]:
-        """How many inputs were taken, by kind, and refused, by cause; none that is 0."""
-        times = columns_of(self.desk.counts)["times"].tolist()
-        refused: dict[str, int] = {}
-        for word, count in zip(REFUSALS, times, strict=False):
-            if count:
-                refused[word] = refused.get(word, 0) + count
-        taken = zip(TAKEN, times[len(REFUSALS) :], strict=True)
-        return {word: count for word, count in taken if count}, refused
+    @property
+    def taken(self) -> Counts:
+        """How many inputs were used, by kind."""
+        return counts_in(self.desk.counts, TAKEN, TAKEN_FRAME)
+
+    @property
+    def refused(self) -> Counts:
+        """How many were not, by cause."""
+        return counts_in(self.desk.counts, REFUSALS)
 
 
 def _held(kind: type[R], rows: Rows[R], ring: Ring) -> list[R]:

@@ -1,4 +1,4 @@
-"""The one shape of every daemon: a pure step over events, and what it owes to the log.
+"""The one shape of every daemon: a step over events that knows its state and no more, and what it owes a log.
 
 A node never looks at a clock and never touches a socket. Live daemons, lockstep and replay differ only in who
 calls :meth:`Node.step` and what ``now_ns`` is.
@@ -14,7 +14,6 @@ from msgspec import Struct
 from hil.wire.events import Event
 from hil.wire.message_types import DiagnosticArray, DiagnosticStatus, KeyValue, Message
 from hil.wire.messages import encode, header, typename_of
-from hil.wire.records import Receipt, receipt_of
 
 S = TypeVar("S")
 
@@ -46,7 +45,10 @@ class Node(Protocol[S]):
         """Diagnostics of the node: how it is and what it has counted; also its last word."""
 
     def step(self, state: S, event: Event, now_ns: int) -> tuple[S, tuple[Outgoing, ...]]:
-        """State after an event, and what to publish. Never raises for anything that came from the wire."""
+        """State after an event, which may be the same one changed, and what to publish.
+
+        Never raises for anything that came from the wire.
+        """
 
 
 def outgoing(topic: str, message: Message, stamp_ns: int) -> Outgoing:
@@ -57,11 +59,6 @@ def outgoing(topic: str, message: Message, stamp_ns: int) -> Outgoing:
 def is_due(due_ns: int, period_ns: int, now_ns: int) -> bool:
     """Whether what is to happen every period is due; also if it is so far off that the clock was set back."""
     return not now_ns < due_ns <= now_ns + period_ns
-
-
-def consumed(event: Event, now_ns: int) -> Receipt:
-    """Receipt for an event that a node took in at ``now_ns``."""
-    return receipt_of(event.digest, now_ns)
 
 
 def no_counts() -> Counts:

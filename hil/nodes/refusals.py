@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from estimation.tracking.follower_check import Cause as FollowerCause
 from estimation.tracking.track_point import Verdict
 from formation.kernel import kernel
-from formation.records import Rows, load, store
 from hil.wire import message_checks
 from hil.wire.message_checks import Cause
 
@@ -31,23 +28,11 @@ _BY_FOLLOWER = _numbered(*(cause.word for cause in sorted(FollowerCause)))
 REFUSALS = tuple(_WORDS)
 """What an input that is not used is counted by; :class:`hil.wire.message_checks.Cause` comes first."""
 
-TAKEN = ("frames", "used", "late", "odometry")
-TAKEN_FRAME, TAKEN_USED, TAKEN_LATE, TAKEN_ODOMETRY = range(len(REFUSALS), len(REFUSALS) + len(TAKEN))
+TAKEN = ("frames", "used", "odometry", "late")
+TAKEN_FRAME, TAKEN_USED, TAKEN_ODOMETRY, TAKEN_LATE = range(len(REFUSALS), len(REFUSALS) + len(TAKEN))
 
 COUNTED = len(REFUSALS) + len(TAKEN)
 """How many counts there are."""
-
-
-class Count(NamedTuple):
-    """How often something has happened."""
-
-    times: int
-
-
-@kernel
-def count(counts: Rows[Count], number: int) -> None:
-    """Count what goes by a number once more."""
-    store(counts, number, Count(load(Count, counts, number).times + 1))
 
 
 @kernel

@@ -16,12 +16,17 @@ def drive_message(motion: Motion, stamp_ns: int, frame_id: str, *, stamped: bool
     return msg.TwistStamped(header=header(stamp_ns, frame_id), twist=twist) if stamped else twist
 
 
+def drive_type(*, stamped: bool) -> str:
+    """Name of the type of drive commands."""
+    return typename_of(msg.TwistStamped if stamped else msg.Twist)
+
+
 def read_drive(payload: bytes, *, stamped: bool) -> Motion:
     """Motion that a drive command asks for, not judged.
 
     Raises :class:`~hil.wire.messages.MalformedPayloadError` for a payload that is none.
     """
-    kind = typename_of(msg.TwistStamped if stamped else msg.Twist)
+    kind = drive_type(stamped=stamped)
     drive = entries.read_drive(in_little_endian(payload, kind), stamped)
     if not drive.sound:
         raise MalformedPayloadError(f"{len(payload)} bytes, expected a {kind}")

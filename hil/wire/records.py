@@ -214,11 +214,6 @@ class Receipt(NamedTuple):
     received_ns: int
 
 
-def receipt_of(digest: int, received_ns: int) -> Receipt:
-    """Receipt of an input by its digest, an unsigned number."""
-    return Receipt(digest - (1 << 64) if digest >> 63 else digest, received_ns)
-
-
 @kernel
 def stamp_of(ns: int) -> Stamp:
     """Stamp of a moment from 1970 to 2038."""

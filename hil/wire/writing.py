@@ -13,8 +13,7 @@ from formation.records import Rows, columns_of, row_of, rows_of
 from hil.wire import entries
 from hil.wire.assumed_errors import AssumedErrors
 from hil.wire.cdr import packed_texts
-from hil.wire.message_types import Twist, TwistStamped
-from hil.wire.messages import typename_of
+from hil.wire.drive_message import drive_type
 from hil.wire.records import Receipt
 from hil.wire.templates import drive_template, estimate_template
 
@@ -39,7 +38,7 @@ class DriveWriter:
 
     def __init__(self, frame_id: str, *, stamped: bool) -> None:
         self._template = drive_template(frame_id, stamped=stamped)
-        self.typename = typename_of(TwistStamped if stamped else Twist)
+        self.typename = drive_type(stamped=stamped)
 
     def write(self, motion: Motion, stamp_ns: int) -> bytes:
         """Bytes of a command."""

@@ -32,6 +32,8 @@ from hil.emulator.world import (
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
 from hil.scenario.start import chain_poses
+from hil.wire.drive_message import drive_message
+from hil.wire.messages import encode
 
 EPOCH_NS = 1_767_225_600_000_000_000
 MS = 1_000_000
@@ -77,7 +79,9 @@ class World3:
             while (last := advance(self.world, self.lab, *self.memory, now_ns)).kind != NOTHING:
                 happened.append(last)
             wanted = Motion(0.01 * k, math.sin(k)) if k % 7 else Motion(math.nan, 0.0)
-            command(self.world, self.lab, self.memory.robots, 1 + k % 2, wanted, now_ns + 3 * MS)
+            payload = encode(drive_message(wanted, now_ns, "follower", stamped=True))
+            rows = self.world, self.lab, self.memory.robots
+            assert command(*rows, 1 + k % 2, payload, True, now_ns + 3 * MS)
             if k == 40:
                 halt(self.world, self.lab, self.memory.robots, now_ns + 4 * MS)
         return happened

@@ -203,12 +203,12 @@ def test_what_cannot_be_read_is_counted_and_the_last_sound_estimate_holds() -> N
     assert [len(command.consumed) for command in commands] == [1, 2]
 
 
-def test_the_same_step_twice_gives_the_same_bytes_and_leaves_its_state_alone() -> None:
+def test_copies_of_a_state_go_on_alike_and_apart() -> None:
     warm, _, _ = fed([(NOW_NS - 10 * MS, estimate(NOW_NS - 10 * MS))])
-    first = NODE.step(warm, estimate(), NOW_NS)
-    fed([(NOW_NS, STOP)], NODE, warm)
-    assert NODE.step(warm, estimate(), NOW_NS)[1] == first[1]
+    first = NODE.step(warm.copy(), estimate(), NOW_NS)
+    fed([(NOW_NS, STOP)], NODE, warm.copy())
     assert (warm.stopped, len(warm.sent)) == (False, 1)
+    assert NODE.step(warm, estimate(), NOW_NS)[1] == first[1]
 
 
 def test_commands_kept_for_the_prediction_stay_few_while_no_estimate_comes() -> None:

@@ -10,18 +10,20 @@ from hypothesis import strategies as st
 
 from controllers.follower import Command
 from controllers.guard import CLOCK_TOLERANCE_NS, StopReason
-from controllers.station_keeper import at_station
-from estimation.tracking.prediction import Reported, SentCommand
+from estimation.tracking.prediction import Reported
 from estimation.tracking.tracker import Status
 from formation.kernel import interpreted
-from formation.records import Rows, columns_of, load, row_of, rows_of
+from formation.records import columns_of, load, store
 from formation.station import Side
-from hil.nodes.control_rules import control_rules
-from hil.nodes.controller_entries import NO_REPORT, ControlEvent, Happening, Outcome, control
-from hil.nodes.controller_step import ControlState, begun
+from hil.nodes.controller import ControllerNode
+from hil.nodes.controller_desk import STOPS as REASONS
+from hil.nodes.controller_entries import control
+from hil.nodes.controller_events import ControlEvent, Happening, happened
+from hil.nodes.controller_step import ControlState
 from hil.scenario.files import load_scenario
-from hil.scenario.parts import station
+from hil.wire.cdr import packed_texts
 
+STOPS = packed_texts(["", *REASONS])
 MS = 1_000_000
 NOW_NS = 1_000_000 * MS
 LAWS = ("independent", "ideal", "feedforward", "faded")
@@ -32,21 +34,20 @@ class Controller:
 
     def __init__(self, law: str, step: object = control, scenario: str = "turtlebot3") -> None:
         chosen = load_scenario(scenario, [f"controller.law={law}"])
-        self.rules = row_of(control_rules(chosen))
-        self.states = row_of(begun(at_station(station(chosen)), NOW_NS))
-        self.commands: Rows[SentCommand] = rows_of(SentCommand, 64)
-        self.result: Rows[Command] = rows_of(Command, 1)
+        self.state = ControllerNode(chosen).begin(NOW_NS)
+        self.desk = self.state.desk
         self.step = step
 
-    def take(self, event: ControlEvent, now_ns: int) -> int:
-        outcome: int = self.step(  # type: ignore[operator]
-            self.states, self.rules, self.commands, row_of(event), self.result, now_ns
-        )
-        return outcome
+    def take(self, event: ControlEvent, now_ns: int) -> bool:
+        """Whether a command came of it."""
+        store(self.desk.event, 0, event)
+        desk = self.state.lent if self.step is control else [self.desk]
+        length: int = self.step(desk, STOPS, now_ns)  # type: ignore[operator]
+        return length > 0
 
     @property
     def command(self) -> Command:
-        return load(Command, self.result, 0)
+        return load(Command, self.desk.result, 0)
 
 
 def reported(capture_ns: int, **changes: float) -> Reported:
@@ -58,10 +59,6 @@ def estimate(capture_ns: int, status: int = Status.TRACKING.value, **changes: fl
     return ControlEvent(Happening.ESTIMATE.value, status, 0.0, reported(capture_ns, **changes))
 
 
-def plain(kind: Happening, number: float = 0.0) -> ControlEvent:
-    return ControlEvent(kind.value, 0, number, NO_REPORT)
-
-
 QUANTITIES = ("rho", "alpha2", "v1", "alpha1", "u1", "var_u1", "v2")
 OTHERS = [each for each in Happening if each is not Happening.ESTIMATE]
 numbers = st.one_of(st.floats(), st.floats(-2.0, 2.0))
@@ -71,7 +68,7 @@ estimates = st.builds(
     st.sampled_from(Status),
     st.dictionaries(st.sampled_from(QUANTITIES), numbers, max_size=1),
 )
-others = st.builds(plain, st.sampled_from(OTHERS), st.just(-1.0))
+others = st.builds(happened, st.sampled_from(OTHERS), st.just(-1.0))
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -94,37 +91,41 @@ def test_compiled_and_interpreted_are_the_same(
 
 def nan_free(controller: Controller) -> str:
     """All rows in words: NaN has several forms in bytes."""
-    state = load(ControlState, controller.states, 0)
-    return repr((state, controller.command, columns_of(controller.commands).tolist()))
+    state = load(ControlState, controller.desk.control, 0)
+    commands, refused = columns_of(controller.desk.commands).tolist(), controller.state.refused
+    return repr((state, controller.command, commands, refused))
 
 
 @pytest.mark.parametrize("ahead_ns", [0, 40 * MS, CLOCK_TOLERANCE_NS])
 def test_an_estimate_whose_stamps_are_accepted_may_move_the_robot(ahead_ns: int) -> None:
     """Stamps that message checks let pass, of a clock that is ahead, do not stop every command."""
     controller = Controller("independent")
-    assert controller.take(estimate(NOW_NS + ahead_ns), NOW_NS) == Outcome.COMMAND
+    assert controller.take(estimate(NOW_NS + ahead_ns), NOW_NS)
     assert controller.command.stop is None
 
 
 def test_a_clock_that_is_further_ahead_is_refused_by_name() -> None:
     controller = Controller("independent")
-    assert controller.take(estimate(NOW_NS + CLOCK_TOLERANCE_NS + 1), NOW_NS) == Outcome.BAD_STAMP
-    assert controller.take(plain(Happening.TICK), NOW_NS) == Outcome.COMMAND
+    assert not controller.take(estimate(NOW_NS + CLOCK_TOLERANCE_NS + 1), NOW_NS)
+    assert controller.state.refused == {"bad_stamp": 1}
+    assert controller.take(happened(Happening.TICK), NOW_NS)
     assert controller.command.stop is StopReason.NO_ESTIMATE
 
 
 def test_orders_and_the_leaders_turn_rate_move_nobody() -> None:
     controller = Controller("ideal")
-    assert controller.take(plain(Happening.LEADER, 0.4), NOW_NS) == Outcome.NO_COMMAND
-    assert load(ControlState, controller.states, 0).leader_u1 == 0.4
-    assert controller.take(plain(Happening.ORDER, Side.RIGHT.sign), NOW_NS) == Outcome.NO_COMMAND
-    assert controller.take(plain(Happening.ORDER, Side.LEFT.sign), NOW_NS) == Outcome.UNSAFE_ORDER
+    assert not controller.take(happened(Happening.LEADER, 0.4), NOW_NS)
+    assert load(ControlState, controller.desk.control, 0).leader_u1 == 0.4
+    assert not controller.take(happened(Happening.ORDER, Side.RIGHT.sign), NOW_NS)
+    assert controller.state.refused == {}
+    assert not controller.take(happened(Happening.ORDER, Side.LEFT.sign), NOW_NS)
+    assert controller.state.refused == {"unsafe_side_change": 1}
 
 
 def test_a_clock_that_is_set_back_ends_what_is_known() -> None:
     controller = Controller("faded")
     controller.take(estimate(NOW_NS - MS), NOW_NS)
-    controller.take(plain(Happening.NOTHING), NOW_NS - 10 * MS)
-    state = load(ControlState, controller.states, 0)
+    controller.take(happened(Happening.NOTHING), NOW_NS - 10 * MS)
+    state = load(ControlState, controller.desk.control, 0)
     assert (state.known, state.trend.known, state.sent.length) == (False, False, 0)
     assert math.isnan(state.leader_u1)

@@ -23,7 +23,7 @@ from estimation.tracking.tracker import TrackSettings
 from formation.pose import Pose, advance
 from formation.records import Rows, columns_of, lent, load, rows_of, store
 from formation.ring import Ring
-from hil.nodes.estimator_desk import Desk, NodeRules, Notes, SensorRules, Shown
+from hil.nodes.estimator_desk import Desk, NodeRules, Notes, SensorRules, TimedFrame
 from hil.nodes.estimator_entries import COMPILED, PLAIN
 from hil.nodes.estimator_memory import EstimatorMemory
 from hil.nodes.estimator_step import FUSED, MOCAP, ODOMETRY, Known, Rules, Told, estimate
@@ -47,7 +47,7 @@ SETUP_IDS = [f"{kind.name.lower()}-{front_end.value}-{SOURCES[source]}" for kind
 REASONS = packed_texts(ALL_REASONS)
 ASSUMED = AssumedErrors.of(load_scenario("turtlebot3"))
 
-Message = Shown | Sighting | MotionSample
+Message = TimedFrame | Sighting | MotionSample
 
 
 class Sent(NamedTuple):
@@ -100,8 +100,8 @@ class Estimator:
             store(self.desk.sample, 0, message)
             self._steps.take_odometry(self._lent)
             return None
-        if isinstance(message, Shown):
-            store(self.desk.shown, 0, message)
+        if isinstance(message, TimedFrame):
+            store(self.desk.frame, 0, message)
             self._steps.take_frame(self._lent, REASONS, now_ns)
         else:
             store(self.desk.sighting, 0, message)
@@ -178,7 +178,7 @@ def smooth_drive(seed: int, frames: int) -> list[Sent]:
     pair, sent = Pair(seed), list[Sent]()
     for k in range(frames):
         pair.step()
-        sent.append(Sent(pair.at_ns, Shown(pair.at_ns, pair.seen())))
+        sent.append(Sent(pair.at_ns, TimedFrame(pair.at_ns, pair.seen())))
         if k % 4 == 0:
             sent.append(Sent(pair.at_ns, pair.sample()))
     return sent
@@ -216,7 +216,7 @@ def rough_drive(seed: int, sightings: bool) -> list[Sent]:
             sent.append(Sent(pair.at_ns + late, pair.sample()))
         if 140 <= k < 160 or 300 <= k < 440:  # short of frames for a while, and then for too long
             continue
-        message: Message = Shown(pair.at_ns, seen)
+        message: Message = TimedFrame(pair.at_ns, seen)
         if sightings and random.random() < 0.2:
             message = pair.sighting()
         late = float(random.choice([0.0, 10e6, 60e6, 300e6], p=[0.6, 0.2, 0.18, 0.02]))

@@ -15,7 +15,7 @@ from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
 from hil.wire.assumed_errors import AssumedErrors, bounds_of
 from hil.wire.messages import encode, header, to_time
-from hil.wire.records import Receipt, receipt_of
+from hil.wire.records import Receipt
 from hil.wire.writing import DriveWriter, EstimateWriter
 
 ASSUMED = AssumedErrors.of(load_scenario("turtlebot3"))
@@ -41,6 +41,13 @@ estimates = st.builds(
     status=st.sampled_from([status.value for status in Status]),
     jump=st.just(NO_JUMP),
 )
+
+
+def receipt_of(digest: int, received_ns: int) -> Receipt:
+    """Receipt of an input by its digest, an unsigned number."""
+    return Receipt(digest - (1 << 64) if digest >> 63 else digest, received_ns)
+
+
 receipts = st.lists(st.builds(receipt_of, st.integers(0, 2**64 - 1), moments), max_size=4)
 told = st.tuples(estimates, st.sampled_from(range(len(REASONS))), moments, receipts)
 
