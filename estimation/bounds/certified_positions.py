@@ -1,8 +1,8 @@
 """What motion capture makes certain of a leader, frame by frame as they come.
 
-Rests on the premises that every position that was believed, of either robot, errs by no more than eps, that
-its capture time is right, and that the leader keeps to its speeds and accelerates by no more than A. Leaving
-out a frame makes the result weaker, never wrong.
+Rests on the assumptions that every position that was believed, of either robot, errs by no more than eps,
+that its capture time is right, and that the leader keeps to its speeds and accelerates by no more than A.
+Leaving out a frame makes the result weaker, never wrong.
 """
 
 from __future__ import annotations

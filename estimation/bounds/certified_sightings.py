@@ -11,7 +11,7 @@ ago is wrong by M_v2 and points v M_u2 s aside. So the leader's velocity is cert
 at best 2 sqrt(e (A + v M_u2)) + M_v2 + rho M_u2: unlike positions in the world, better sightings alone do not
 bring it down to nothing.
 
-Rests on the premises that every sighting that was believed is within its bounds, that odometry, taken as
+Rests on the assumptions that every sighting that was believed is within its bounds, that odometry, taken as
 linear between its samples and held after the last, is within its own on the mean over the window, that
 capture times and stamps are right, and on the leader's limits.
 """

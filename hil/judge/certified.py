@@ -19,7 +19,7 @@ from hil.wire.messages import to_ns
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CertifiedColumns:
-    """Certified estimates as arrays of shape (n,); a radius is NaN where ``failed`` names a premise."""
+    """Certified estimates as arrays of shape (n,); a radius is NaN where ``failed`` names an assumption."""
 
     capture_ns: Stamps
     v1: FloatArray
@@ -48,9 +48,9 @@ class CertifiedColumns:
 def judge_certified(certified: Sequence[CertifiedEstimate], truth: TrueStates, span: Span) -> dict[str, Any]:
     """The ``certified`` part of a summary, of all certified estimates within a span; empty without any.
 
-    ``certified``: how many have radii; ``failed``: how many do not, by the premise that failed. Per quantity
-    v1 [m/s] and alpha1 [rad] the median and the largest radius; where the truth is known, how many errors
-    exceed theirs (none may) and the largest error / radius.
+    ``certified``: how many have radii; ``failed``: how many do not, by the assumption that failed. Per
+    quantity v1 [m/s] and alpha1 [rad] the median and the largest radius; where the truth is known, how many
+    errors exceed theirs (none may) and the largest error / radius.
     """
     columns = CertifiedColumns.of(certified, span)
     if not len(columns.capture_ns):

@@ -53,7 +53,7 @@ def test_errors_beyond_a_radius_are_counted(evidence: Evidence) -> None:
     assert certified_violations(found) == {"v1_certified": found["certified"]["certified"]}
 
 
-def test_premises_that_fail_are_counted_by_name(short_log: Log) -> None:
+def test_assumptions_that_fail_are_counted_by_name(short_log: Log) -> None:
     """A leader that is faster than it is said to be is found out, and no radius is made up."""
     found = summarise(certified(short_log, "leader.k_v=0.06"))["certified"]
     assert found["failed"]["noise"] > 100
