@@ -95,13 +95,13 @@ def mixture(beliefs: Sequence[Belief], probabilities: Sequence[float]) -> Belief
     within = np.einsum("k,kij->ij", weights, np.stack([each.covariance for each in beliefs]))
     covariance = within + (apart.T * weights) @ apart
     modes = Modes(tuple(beliefs), tuple(probabilities))
-    return Belief(mean, 0.5 * (covariance + covariance.T), memory=modes)
+    return Belief(mean, 0.5 * (covariance + covariance.T), filter_state=modes)
 
 
 def _modes_of(belief: Belief) -> Modes:
-    if not isinstance(belief.memory, Modes):
-        raise TypeError(f"belief remembers {type(belief.memory).__name__}, expected Modes")
-    return belief.memory
+    if not isinstance(belief.filter_state, Modes):
+        raise TypeError(f"filter state is {type(belief.filter_state).__name__}, expected Modes")
+    return belief.filter_state
 
 
 def _log_likelihood(belief: Belief, measurement: Measurement) -> float:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 from estimation.filters.estimator import whole_of
+from estimation.filters.filter_states import SensorOffsets
 from estimation.filters.gaussian import Gaussian
-from estimation.filters.memory import SensorOffsets
 
 
 def offsets_report(belief: Gaussian) -> dict[str, object]:
     """Diagnostics of a filter with states for the sensor's offsets; empty for any other."""
-    known = whole_of(belief).memory
+    known = whole_of(belief).filter_state
     if not isinstance(known, SensorOffsets):
         return {}
     values = (*known.mean.tolist(), math.sqrt(known.covariance[0, 0]), math.sqrt(known.covariance[1, 1]))

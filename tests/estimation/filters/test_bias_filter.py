@@ -133,7 +133,7 @@ def test_the_gate_knows_of_the_offsets() -> None:
         # Sure of the leader, so that only the offsets can explain what is seen.
         begun = estimator.start(seen[0])
         belief = begun._replace(
-            covariance=1e-8 * np.eye(5), memory=replace(offsets_of(begun), cross=np.zeros((5, 2)))
+            covariance=1e-8 * np.eye(5), filter_state=replace(offsets_of(begun), cross=np.zeros((5, 2)))
         )
         prior = estimator.predict(belief, DT, seen[1].motion)
         after, nis = estimator.step(belief, DT, seen[1].motion, far, math.inf)

@@ -1,4 +1,4 @@
-"""What some estimators know beyond mean and covariance: plain data that travels in the belief."""
+"""Filter states: what some estimators know beyond mean and covariance, plain data in the belief."""
 
 from __future__ import annotations
 
