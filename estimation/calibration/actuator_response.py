@@ -69,7 +69,7 @@ def fit_response(
 
     Times (m,), (n,) [s] increase and have one zero. A grid of delays and lags finds where the median residual
     is least; from there on least squares with a soft l1 loss, each channel scaled by the spread of its
-    residuals, so that a saturated spell or a broken sample bends the fit little. The standard deviations are
+    residuals, so that a saturated part or a broken sample bends the fit little. The standard deviations are
     the larger ones of what independent errors leave and what the sums over blocks of a second or more show
     (Huber's sandwich), as rounding and slip make neighbours err alike. Unknown is what too little motion, or
     motion at an even speed, leaves uncertain by more than :data:`LARGEST_SD`, and what lies at an end of the

@@ -12,6 +12,7 @@ from bokeh.plotting import figure
 from formation.angles import FloatArray
 from hil.figures.shown import LONGEST_LINE, Shown
 from hil.judge.columns import inside
+from hil.reports.intervals import TimeInterval, intervals_of
 from hil.reports.plots import (
     FOLLOWER,
     GREY,
@@ -26,16 +27,15 @@ from hil.reports.plots import (
     limits_around,
     table,
 )
-from hil.reports.spells import Spell, spells_of
 
 
-def stops_of(shown: Shown) -> list[Spell]:
-    """Spells over which the robot was told to stand still, by reason, while the run lasted."""
+def stops_of(shown: Shown) -> list[TimeInterval]:
+    """Intervals over which the robot was told to stand still, by reason, while the run lasted."""
     issued_ns = shown.columns.commands.issued_ns
     during = inside(issued_ns, shown.columns.run) & (issued_ns < shown.columns.run.to_ns)
     reasons = [each.stop for each, counts in zip(shown.evidence.commands, during, strict=True) if counts]
-    spells = spells_of(shown.seconds(issued_ns[during]), reasons, LONGEST_LINE)
-    return [spell for spell in spells if spell.what]
+    intervals = intervals_of(shown.seconds(issued_ns[during]), reasons, LONGEST_LINE)
+    return [interval for interval in intervals if interval.what]
 
 
 def command_panels(shown: Shown, axis: TimeAxis) -> list[Panel]:
@@ -58,7 +58,7 @@ def _panel(
     t: FloatArray,
     sent: FloatArray,
     limit: float,
-    stops: Sequence[Spell],
+    stops: Sequence[TimeInterval],
 ) -> Panel:
     low, high = min(float(np.min(sent)), 0.0), float(np.max(sent))
     # A limit far outside what is driven would only flatten the curve.
@@ -78,11 +78,11 @@ def _panel(
     return Panel(f"Commanded {what} {symbol}", f"The follower's {what} as commanded.", tuple(keys), plot)
 
 
-def _shade(plot: figure, stops: Sequence[Spell], y: tuple[float, float]) -> None:
+def _shade(plot: figure, stops: Sequence[TimeInterval], y: tuple[float, float]) -> None:
     held = {
-        "left": [spell.from_s for spell in stops],
-        "right": [spell.to_s for spell in stops],
-        "why": [spell.what for spell in stops],
+        "left": [interval.from_s for interval in stops],
+        "right": [interval.to_s for interval in stops],
+        "why": [interval.what for interval in stops],
     }
     area = Quad(
         left="left", right="right", bottom=y[0], top=y[1],

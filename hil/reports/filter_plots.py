@@ -12,6 +12,7 @@ from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
 from hil.figures.shown import LONGEST_LINE, Shown
 from hil.judge.columns import inside
+from hil.reports.intervals import intervals_of
 from hil.reports.plots import (
     BELIEVED,
     BOUND,
@@ -29,7 +30,6 @@ from hil.reports.plots import (
     marks,
     table,
 )
-from hil.reports.spells import spells_of
 from hil.reports.thinning import telling_rows
 
 _STATUS_COLOURS = {
@@ -51,18 +51,18 @@ def status_panel(shown: Shown, axis: TimeAxis) -> Panel | None:
         return None
     statuses = [Status(code) for code in estimates.status[during].tolist()]
     names = [status.name.lower() for status in statuses]
-    spells = spells_of(shown.seconds(estimates.capture_ns[during]), names, LONGEST_LINE)
+    intervals = intervals_of(shown.seconds(estimates.capture_ns[during]), names, LONGEST_LINE)
     occurring = [status for status in Status if status in statuses]
     rows = [status.name.lower() for status in reversed(occurring)]
     plot = axis.panel("", rows, _AXIS_HEIGHT + _ROW_HEIGHT * len(rows))
     plot.min_border_left = 78
     for status in occurring:
-        own = [spell for spell in spells if spell.what == status.name.lower()]
+        own = [interval for interval in intervals if interval.what == status.name.lower()]
         held = {
-            "row": [spell.what for spell in own],
-            "from": [spell.from_s for spell in own],
-            "to": [spell.to_s for spell in own],
-            "count": [spell.count for spell in own],
+            "row": [interval.what for interval in own],
+            "from": [interval.from_s for interval in own],
+            "to": [interval.to_s for interval in own],
+            "count": [interval.count for interval in own],
         }
         colour = _STATUS_COLOURS[status]
         bar = HBar(
