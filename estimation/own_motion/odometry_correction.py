@@ -20,7 +20,7 @@ SPAN_NS = 30_000_000_000
 EVERY_NS = 1_000_000_000
 """How often."""
 
-_THINNED_NS = 30_000_000  # between two poses or samples that are kept
+_DECIMATED_NS = 30_000_000  # between two poses or samples that are kept
 _SURE = 4.0  # standard deviations off the ideal, before a correction begins
 _LEAST_DELAY = 0.02  # [s]; below this nothing is worth correcting
 _LEAST_SCALE = 0.02
@@ -28,7 +28,7 @@ _LEAST_SCALE = 0.02
 
 @dataclass(frozen=True, slots=True)
 class OdometryWatch:
-    """What alignment rests on, thinned: poses (capture_ns, pose) and samples of odometry.
+    """What alignment rests on, decimated: poses (capture_ns, pose) and samples of odometry.
 
     ``found``: what it let know last; ``applied``: what odometry is corrected by.
     """
@@ -46,7 +46,7 @@ NOTHING_SEEN = OdometryWatch()
 def with_pose(watch: OdometryWatch, capture_ns: int, pose: Pose) -> OdometryWatch:
     """Watch with a mocap pose of the follower, if it is new and not too close to the one before."""
     poses = watch.poses
-    if poses and capture_ns < poses[-1][0] + _THINNED_NS:
+    if poses and capture_ns < poses[-1][0] + _DECIMATED_NS:
         return watch
     first = 0
     while first < len(poses) and poses[first][0] < capture_ns - SPAN_NS:
@@ -57,7 +57,7 @@ def with_pose(watch: OdometryWatch, capture_ns: int, pose: Pose) -> OdometryWatc
 def with_sample(watch: OdometryWatch, sample: MotionSample) -> OdometryWatch:
     """Watch with a sample of odometry, if it is new and not too close to the one before."""
     samples = watch.samples
-    if samples and sample.stamp_ns < samples[-1].stamp_ns + _THINNED_NS:
+    if samples and sample.stamp_ns < samples[-1].stamp_ns + _DECIMATED_NS:
         return watch
     first = 0
     while first < len(samples) and samples[first].stamp_ns < sample.stamp_ns - SPAN_NS:

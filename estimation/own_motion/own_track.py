@@ -139,8 +139,8 @@ def own_followed(last: OwnPoint, due: OwnPoint, noise: OwnNoise) -> OwnPoint:
     else:
         state, spread = found.state, found.spread
     if due.told:
-        thinned = max(1.0, 2.0 * ODOMETRY_CORRELATION / dt)
-        by_odometry = _with_motion(state, spread, due.odometry, thinned)
+        inflation = max(1.0, 2.0 * ODOMETRY_CORRELATION / dt)
+        by_odometry = _with_motion(state, spread, due.odometry, inflation)
         if by_odometry.nis <= _MOTION_GATE:
             state, spread = by_odometry.state, by_odometry.spread
     return due._replace(state=state, spread=spread, used_ns=used_ns, rejected=rejected)
@@ -216,9 +216,9 @@ def _with_pose(state: OwnState, p: OwnSpread, pose: Pose, noise: PoseNoise) -> U
 
 
 @kernel
-def _with_motion(state: OwnState, p: OwnSpread, told: FollowerMotion, thinned: float) -> Updated:
+def _with_motion(state: OwnState, p: OwnSpread, told: FollowerMotion, inflation: float) -> Updated:
     """After odometry whose samples tell less than their number, by a factor on their variance."""
-    speed, turn = thinned * told.sd_v2 * told.sd_v2, thinned * told.sd_u2 * told.sd_u2
+    speed, turn = inflation * told.sd_v2 * told.sd_v2, inflation * told.sd_u2 * told.sd_u2
     first = _measured(
         Updated(state, p, 0.0), OwnState(p.x_v, p.y_v, p.t_v, p.v_v, p.v_u), p.v_v + speed, told.v2 - state.v
     )

@@ -14,6 +14,7 @@ from hil.figures.shown import Shown, broken_at_jumps, outside
 from hil.judge.columns import EstimateColumns, inside
 from hil.judge.estimation import errors_at
 from hil.reports.certified_lines import draw_certified, largest_radius
+from hil.reports.decimation import decimated_rows
 from hil.reports.plots import (
     BELIEVED,
     BOUND,
@@ -31,7 +32,6 @@ from hil.reports.plots import (
     marks,
     table,
 )
-from hil.reports.thinning import telling_rows
 
 _FARTHEST = 4.0
 """A bound so many times beyond what else is in the picture would flatten it, and is left to the words."""
@@ -190,6 +190,6 @@ def _range(bound: FloatArray, unit: str) -> str:
 
 def _mark(plot: figure, t: FloatArray, error: FloatArray, height: float) -> None:
     """Crosses at samples that violate their bound; those beyond the picture at its edge."""
-    rows = telling_rows(error)
+    rows = decimated_rows(error)
     shown_at = np.clip(error[rows], -0.97 * height, 0.97 * height)
     draw_marks(plot, marks(t[rows], shown_at), "x", BOUND, 8.0)

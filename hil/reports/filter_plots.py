@@ -12,6 +12,7 @@ from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
 from hil.figures.shown import LONGEST_LINE, Shown
 from hil.judge.columns import inside
+from hil.reports.decimation import decimated_rows
 from hil.reports.intervals import intervals_of
 from hil.reports.plots import (
     BELIEVED,
@@ -30,7 +31,6 @@ from hil.reports.plots import (
     marks,
     table,
 )
-from hil.reports.thinning import telling_rows
 
 _STATUS_COLOURS = {
     Status.INITIALISING: GREY,
@@ -87,7 +87,7 @@ def nis_panel(shown: Shown, axis: TimeAxis) -> Panel | None:
     plot = axis.panel("NIS", (0.0, top))
     for level, colour, dash in ((_EXPECTED_NIS, GREY, "solid"), (gate, BOUND, "dashed")):
         draw_level(plot, level, colour, dash)
-    rows = telling_rows(nis)
+    rows = decimated_rows(nis)
     t, nis, over = t[rows], nis[rows], nis[rows] > top
     dots = draw_marks(plot, marks(t[~over], nis[~over]), "circle", BELIEVED, 3.0)
     hover(plot, dots, {"t": "@t{0.00} s", "NIS": "@y{0.00}"}, mode="mouse")
@@ -119,7 +119,7 @@ def latency_panel(shown: Shown, axis: TimeAxis) -> Panel | None:
     keys = [Key("age of the capture behind every command", FOLLOWER)]
     fresh = commands.fresh[based]
     if np.any(fresh):
-        rows = telling_rows(age_ms[fresh])
+        rows = decimated_rows(age_ms[fresh])
         draw_marks(plot, marks(t[fresh][rows], age_ms[fresh][rows]), "circle", BELIEVED, 3.0)
         keys.append(Key("latency: first command on a capture", BELIEVED, "dot"))
     return Panel("Latency and age", "How old the motion capture behind the commands was.", tuple(keys), plot)

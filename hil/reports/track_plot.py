@@ -12,8 +12,8 @@ from bokeh.plotting import figure
 from formation.angles import FloatArray
 from hil.figures.shown import Shown, with_gaps
 from hil.judge.columns import inside
+from hil.reports.decimation import MOST_POINTS, spread_rows
 from hil.reports.plots import FOLLOWER, GREY, LEADER, Key, Panel, blank, hover
-from hil.reports.thinning import MOST_POINTS, spread_rows
 
 _HEIGHT = 460
 _MOMENTS = 7

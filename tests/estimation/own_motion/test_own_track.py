@@ -238,10 +238,10 @@ def by_matrices(
     turn[2, 0] = turn[4, 1] = 1.0
     noise = 0.04 * drive @ ramp @ drive.T + 0.36 * turn @ ramp @ turn.T
     mean, covariance = moved(mean), move @ covariance @ move.T + noise
-    thinned = 2.0 * 0.05 / dt
+    inflation = 2.0 * 0.05 / dt
     for rows, value, variances in (
         ([0, 1, 2], np.array(seen), np.square([7e-4, 7e-4, 8e-3])),
-        ([3, 4], np.array(told[:2]), thinned * np.square(told[2:])),
+        ([3, 4], np.array(told[:2]), inflation * np.square(told[2:])),
     ):
         see = np.eye(5)[rows]
         residual = value - see @ mean
