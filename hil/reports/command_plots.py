@@ -10,7 +10,7 @@ from bokeh.models.glyphs import Quad
 from bokeh.plotting import figure
 
 from formation.angles import FloatArray
-from hil.figures.shown import LONGEST_LINE, Shown
+from hil.figures.plot_data import LONGEST_LINE, PlotData
 from hil.judge.columns import inside
 from hil.reports.intervals import TimeInterval, intervals_of
 from hil.reports.plots import (
@@ -29,22 +29,22 @@ from hil.reports.plots import (
 )
 
 
-def stops_of(shown: Shown) -> list[TimeInterval]:
+def stops_of(data: PlotData) -> list[TimeInterval]:
     """Intervals over which the robot was told to stand still, by reason, while the run lasted."""
-    issued_ns = shown.columns.commands.issued_ns
-    during = inside(issued_ns, shown.columns.run) & (issued_ns < shown.columns.run.to_ns)
-    reasons = [each.stop for each, counts in zip(shown.evidence.commands, during, strict=True) if counts]
-    intervals = intervals_of(shown.seconds(issued_ns[during]), reasons, LONGEST_LINE)
+    issued_ns = data.columns.commands.issued_ns
+    during = inside(issued_ns, data.columns.run) & (issued_ns < data.columns.run.to_ns)
+    reasons = [each.stop for each, counts in zip(data.evidence.commands, during, strict=True) if counts]
+    intervals = intervals_of(data.seconds(issued_ns[during]), reasons, LONGEST_LINE)
     return [interval for interval in intervals if interval.what]
 
 
-def command_panels(shown: Shown, axis: TimeAxis) -> list[Panel]:
+def command_panels(data: PlotData, axis: TimeAxis) -> list[Panel]:
     """Commanded speed and turn rate with the limits that are near, and the stops."""
-    commands, controller = shown.columns.commands, shown.evidence.scenario.controller
-    during = inside(commands.issued_ns, shown.columns.run)
+    commands, controller = data.columns.commands, data.evidence.scenario.controller
+    during = inside(commands.issued_ns, data.columns.run)
     if not np.any(during):
         return []
-    t, stops = shown.seconds(commands.issued_ns[during]), stops_of(shown)
+    t, stops = data.seconds(commands.issued_ns[during]), stops_of(data)
     speed = _panel(axis, "speed", "v₂", "m/s", t, commands.v2[during], controller.v_max, stops)
     turn = _panel(axis, "turn rate", "u₂", "rad/s", t, commands.u2[during], controller.u_max, stops)
     return [speed, turn]

@@ -54,11 +54,11 @@ def judge_log(log: Log, folder: Path) -> dict[str, Any]:
 def leave(evidence: Evidence, summary: Mapping[str, Any], folder: Path, picture: str) -> None:
     """Write the summary of an evidence, its picture by the given name, and its report."""
     # All that drawing needs: a second of imports, for those who ask only.
+    from hil.figures.plot_data import PlotData
     from hil.figures.run_figures import draw_run
-    from hil.figures.shown import Shown
     from hil.reports.run_report import run_report
 
     write_json(summary, folder / "summary.json")
-    shown = Shown.of(evidence)
-    draw_run(shown, summary, folder / picture)
-    (folder / "report.html").write_text(run_report(shown, summary), encoding="utf-8")
+    data = PlotData.of(evidence)
+    draw_run(data, summary, folder / picture)
+    (folder / "report.html").write_text(run_report(data, summary), encoding="utf-8")

@@ -17,7 +17,7 @@ from bokeh.models.renderers import GlyphRenderer
 from bokeh.plotting import figure
 
 from formation.angles import FloatArray
-from hil.figures.shown import LONGEST_LINE
+from hil.figures.plot_data import LONGEST_LINE
 from hil.reports.decimation import decimated_rows
 
 # Colours of Okabe and Ito, told apart by eyes of every kind; bounds and limits differ by their dashes, too.

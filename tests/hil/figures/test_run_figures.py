@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from hil.figures.panel_strokes import LIMIT
+from hil.figures.plot_data import PlotData
 from hil.figures.run_figures import draw_run
 from hil.figures.run_panels import draw_alpha1_error, draw_v1, draw_v2, panels_for
-from hil.figures.shown import Shown
 from hil.judge.evidence import Evidence, evidence_of_log
 from hil.judge.summary import summarise
 from hil.log.reader import Log
@@ -31,7 +31,7 @@ def axes() -> Axes:
 
 
 def drawn(evidence: Evidence, path: Path) -> Image.Image:
-    draw_run(Shown.of(evidence), summarise(evidence), path)
+    draw_run(PlotData.of(evidence), summarise(evidence), path)
     assert path.stat().st_size < LARGEST_BYTES
     with Image.open(path) as image:
         return image.convert("RGB")
@@ -70,7 +70,7 @@ def lacks_all(evidence: Evidence) -> Evidence:
 
 
 def test_all_that_is_known_has_its_panel(exact_evidence: Evidence) -> None:
-    assert tuple(map(len, panels_for(Shown.of(exact_evidence)))) == (1, 4, 4)
+    assert tuple(map(len, panels_for(PlotData.of(exact_evidence)))) == (1, 4, 4)
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_what_is_not_known_is_left_out(
 ) -> None:
     assert callable(lack)
     evidence = lack(exact_evidence)
-    assert tuple(map(len, panels_for(Shown.of(evidence)))) == panels
+    assert tuple(map(len, panels_for(PlotData.of(evidence)))) == panels
     assert ink(drawn(evidence, tmp_path / "run.png")) > 0.0
 
 
@@ -104,22 +104,22 @@ def test_violations_are_marked(axes: Axes, exact_evidence: Evidence) -> None:
             estimates[number], v1=estimates[number].v1 + 0.01, alpha1=estimates[number].alpha1 + 0.1
         )
     evidence = replace(exact_evidence, estimates=estimates)
-    draw_v1(axes, Shown.of(evidence))
+    draw_v1(axes, PlotData.of(evidence))
     assert marks(axes) == [3]
     assert "violated (3)" in [str(line.get_label()) for line in axes.lines]
-    draw_alpha1_error(axes, Shown.of(evidence))
+    draw_alpha1_error(axes, PlotData.of(evidence))
     assert marks(axes) == [3, 3]
 
 
 def test_no_violation_leaves_no_mark(axes: Axes, exact_evidence: Evidence) -> None:
-    draw_v1(axes, Shown.of(exact_evidence))
-    draw_alpha1_error(axes, Shown.of(exact_evidence))
+    draw_v1(axes, PlotData.of(exact_evidence))
+    draw_alpha1_error(axes, PlotData.of(exact_evidence))
     assert marks(axes) == []
 
 
 def test_no_line_is_drawn_across_a_gap(axes: Axes, exact_evidence: Evidence) -> None:
     silent = [each for k, each in enumerate(exact_evidence.estimates) if not 100 <= k < 160]
-    draw_v1(axes, Shown.of(replace(exact_evidence, estimates=silent)))
+    draw_v1(axes, PlotData.of(replace(exact_evidence, estimates=silent)))
     line = next(line for line in axes.lines if line.get_label() == "estimate")
     assert np.count_nonzero(np.isnan(np.asarray(line.get_ydata(), dtype=float))) == 1
     (band,) = axes.collections
@@ -127,7 +127,7 @@ def test_no_line_is_drawn_across_a_gap(axes: Axes, exact_evidence: Evidence) -> 
 
 
 def test_limits_of_a_command_show_where_they_matter(axes: Axes, exact_evidence: Evidence) -> None:
-    draw_v2(axes, Shown.of(exact_evidence))
+    draw_v2(axes, PlotData.of(exact_evidence))
     heights = [np.asarray(line.get_ydata(), dtype=float).tolist() for line in axes.lines]
     assert [0.22, 0.22] in heights
     assert [-0.22, -0.22] not in heights

@@ -15,7 +15,7 @@ import pytest
 from selenium.webdriver import Chrome
 
 from estimation.tracking.tracker import Status
-from hil.figures.shown import Shown
+from hil.figures.plot_data import PlotData
 from hil.judge.evidence import Evidence, evidence_of_log
 from hil.judge.summary import summarise
 from hil.log.reader import Log
@@ -28,7 +28,7 @@ LARGEST_BYTES = 3_000_000
 
 
 def report(evidence: Evidence) -> str:
-    return run_report(Shown.of(evidence), summarise(evidence))
+    return run_report(PlotData.of(evidence), summarise(evidence))
 
 
 def words(page: str) -> str:
@@ -148,7 +148,7 @@ def eventful(exact_evidence: Evidence) -> str:
     certificate = {"h": {"sound": 0.25, "assumes": ["calm", "order"]}, "k_u_star": {"why": "<too fast>"}}
     summary = summarise(evidence) | {"certificate": certificate, "weather": {"wind": [0.5, 0.25]}}
     summary["rejected"] = {"gated": 1, "swapped": 2}
-    return run_report(Shown.of(evidence), summary)
+    return run_report(PlotData.of(evidence), summary)
 
 
 def test_the_head_says_what_was_run_and_how_it_went(eventful: str) -> None:

@@ -25,7 +25,7 @@ LONGEST_LINE = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shown:
+class PlotData:
     """What is drawn. ``tracked``: estimates of the whole run that say TRACKING, and their truth.
 
     ``worst``: what the bounds rest on, None without judged samples; ``bounds``, ``errors``: the named bounds
@@ -44,7 +44,7 @@ class Shown:
     certified: CertifiedColumns
 
     @staticmethod
-    def of(evidence: Evidence) -> Shown:
+    def of(evidence: Evidence) -> PlotData:
         """Gather what is drawn of an evidence."""
         columns = columns_of(evidence)
         driven = evidence.motion_since_ns is not None
@@ -61,7 +61,7 @@ class Shown:
             errors = bound_errors(evidence.scenario, columns)
         true = columns.truth.at(tracked.capture_ns)
         certified = CertifiedColumns.of(evidence.certified, columns.span)
-        return Shown(evidence, columns, tracked, true, worst, bounds, errors, orbit, certified)
+        return PlotData(evidence, columns, tracked, true, worst, bounds, errors, orbit, certified)
 
     def seconds(self, moments_ns: Stamps) -> FloatArray:
         """Moments as seconds of the run."""
