@@ -34,7 +34,7 @@ _UNJUDGED = "#000000"
 def draw_run(data: PlotData, summary: Mapping[str, Any], path: Path) -> None:
     """Write a PNG of a run or a replay; ``summary`` is what :func:`hil.judge.summary.summarise` says of it.
 
-    What the evidence does not hold is left out: without truth the tracks, without commands their panels.
+    What the run data does not hold is left out: without truth the tracks, without commands their panels.
     """
     figure = _figure(data)
     figure.suptitle(_title(summary), fontsize=11, y=1.0 - 0.1 / _HEIGHT)

@@ -57,7 +57,7 @@ def draw_v1(axes: Axes, data: PlotData) -> None:
     axes.plot(*with_gaps(t, v1), color=BELIEVED, lw=0.9, label="estimate")
     if np.any(np.isfinite(columns.truth.v1)):
         axes.plot(data.seconds(columns.truth.capture_ns), columns.truth.v1, color=TRUE, lw=1.2, label="truth")
-    reach = max(data.evidence.scenario.leader.k_v, float(np.median(v1)))
+    reach = max(data.run_data.scenario.leader.k_v, float(np.median(v1)))
     judged = data.seconds(columns.samples.capture_ns)
     if "v1" in data.bounds:
         bound, centre = data.bounds["v1" + data.drawn_bound], np.asarray(columns.samples.seen.v1)
@@ -98,20 +98,20 @@ def draw_u1(axes: Axes, data: PlotData) -> None:
     truth = data.columns.truth
     if np.any(np.isfinite(truth.u1)):
         axes.plot(data.seconds(truth.capture_ns), truth.u1, color=TRUE, lw=1.2, label="truth")
-    reach = 2.0 * data.evidence.scenario.leader.k_u
+    reach = 2.0 * data.run_data.scenario.leader.k_u
     limit_to(axes, -reach, reach)
     axes.set_ylabel("$u_1$ [rad/s]")
 
 
 def draw_v2(axes: Axes, data: PlotData) -> None:
     """Follower's speed as commanded, against its limit."""
-    _draw_command(axes, data, data.columns.commands.v2, data.evidence.scenario.controller.v_max)
+    _draw_command(axes, data, data.columns.commands.v2, data.run_data.scenario.controller.v_max)
     axes.set_ylabel("$v_2$ [m/s]")
 
 
 def draw_u2(axes: Axes, data: PlotData) -> None:
     """Follower's turn rate as commanded, against its limit."""
-    _draw_command(axes, data, data.columns.commands.u2, data.evidence.scenario.controller.u_max)
+    _draw_command(axes, data, data.columns.commands.u2, data.run_data.scenario.controller.u_max)
     axes.set_ylabel("$u_2$ [rad/s]")
 
 
@@ -156,7 +156,7 @@ def panels_for(data: PlotData) -> tuple[list[Panel], list[Panel], list[Panel]]:
 
 def _draw_desired(axes: Axes, data: PlotData, column: int, label: str) -> None:
     """Where the formation wants a quantity; other labs' robots were not told."""
-    if data.evidence.motion_since_ns is not None:
+    if data.run_data.motion_since_ns is not None:
         t, courses = data.desired()
         axes.plot(t, courses[column], color=LIMIT, lw=1.0, ls=":", label=label)
 

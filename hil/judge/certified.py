@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation.angles import FloatArray, wrap
-from hil.judge.evidence import Span
+from hil.judge.run_data import Span
 from hil.judge.true_states import Stamps, TrueStates
 from hil.wire.message_types import CertifiedEstimate
 from hil.wire.messages import to_ns

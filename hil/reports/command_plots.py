@@ -33,14 +33,14 @@ def stops_of(data: PlotData) -> list[TimeInterval]:
     """Intervals over which the robot was told to stand still, by reason, while the run lasted."""
     issued_ns = data.columns.commands.issued_ns
     during = inside(issued_ns, data.columns.run) & (issued_ns < data.columns.run.to_ns)
-    reasons = [each.stop for each, counts in zip(data.evidence.commands, during, strict=True) if counts]
+    reasons = [each.stop for each, counts in zip(data.run_data.commands, during, strict=True) if counts]
     intervals = intervals_of(data.seconds(issued_ns[during]), reasons, LONGEST_LINE)
     return [interval for interval in intervals if interval.what]
 
 
 def command_panels(data: PlotData, axis: TimeAxis) -> list[Panel]:
     """Commanded speed and turn rate with the limits that are near, and the stops."""
-    commands, controller = data.columns.commands, data.evidence.scenario.controller
+    commands, controller = data.columns.commands, data.run_data.scenario.controller
     during = inside(commands.issued_ns, data.columns.run)
     if not np.any(during):
         return []

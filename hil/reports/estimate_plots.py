@@ -175,7 +175,7 @@ def _bound(data: PlotData, name: str) -> FloatArray | None:
 
 def _limits(data: PlotData, quantity: _Quantity, value: FloatArray, true: FloatArray) -> tuple[float, float]:
     """Limits of a course; what no leader of the scenario can do belongs to the settling and is cut off."""
-    leader = data.evidence.scenario.leader
+    leader = data.run_data.scenario.leader
     if quantity.name == "v1":
         return limits_around(value, true, floor=0.0, ceiling=1.8 * max(leader.k_v, float(np.median(value))))
     if quantity.name == "u1":

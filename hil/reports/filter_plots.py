@@ -82,7 +82,7 @@ def nis_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
     if not np.any(known):
         return None
     t, nis = data.seconds(estimates.capture_ns[known]), estimates.nis[known]
-    gate = -2.0 * math.log1p(-data.evidence.scenario.estimator.gate_probability)
+    gate = -2.0 * math.log1p(-data.run_data.scenario.estimator.gate_probability)
     top = 1.25 * gate
     plot = axis.panel("NIS", (0.0, top))
     for level, colour, dash in ((_EXPECTED_NIS, GREY, "solid"), (gate, BOUND, "dashed")):

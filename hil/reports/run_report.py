@@ -24,7 +24,7 @@ _MARKS = {GOOD: ("good", "✓ "), BAD: ("bad", "✗ ")}
 
 
 def run_report(data: PlotData, summary: Mapping[str, Any]) -> str:
-    """HTML of a page that needs nothing but itself; ``summary`` is that of the same evidence.
+    """HTML of a page that needs nothing but itself; ``summary`` is that of the same run data.
 
     What cannot be known is left out. Depends on its arguments alone, and on the version of Bokeh.
     """

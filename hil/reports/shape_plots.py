@@ -67,7 +67,7 @@ def _panels(
     estimated: bool,
 ) -> list[Panel]:
     colour, label = (BELIEVED, "estimate") if estimated else (TRUE, "truth")
-    driven = data.evidence.motion_since_ns is not None
+    driven = data.run_data.motion_since_ns is not None
     since, desired = data.desired()
     panels = []
     for k, (name, symbol, unit, title, says) in enumerate(_SHAPES):

@@ -17,8 +17,8 @@ from formation.angles import FloatArray, wrap
 from hil.judge.bounds import judge_bounds
 from hil.judge.columns import Columns, CommandColumns, EstimateColumns, inside
 from hil.judge.estimation import WARM_UP_NS, estimate_errors, least_deviations
-from hil.judge.evidence import Span, judged_from_ns
 from hil.judge.noise_free_orbit import NoiseFreeOrbit, noise_free_orbit
+from hil.judge.run_data import Span, judged_from_ns
 from hil.judge.true_states import TrueStates
 from hil.lockstep.flyer import Flown, Flyer
 from hil.scenario.files import build_scenario, scenario_text, with_overrides

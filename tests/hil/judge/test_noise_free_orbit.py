@@ -11,8 +11,8 @@ from formation.closed_loop import Trajectory, simulate_pair
 from formation.pose import Motion
 from formation.shape import Shape
 from formation.station import Side
-from hil.judge.evidence import Span
 from hil.judge.noise_free_orbit import noise_free_orbit
+from hil.judge.run_data import Span
 from hil.judge.side_orders import Order
 from hil.judge.true_states import TrueStates
 from hil.scenario.files import load_scenario

@@ -13,7 +13,7 @@ import pytest
 
 from hil.command_line import main
 from hil.judge.chain_summary import summarise_chain
-from hil.judge.evidence import evidence_of_link
+from hil.judge.run_data import run_data_of_link
 from hil.lockstep.run import run_lockstep
 from hil.log.events import Timed, logged_events
 from hil.log.reader import read_log
@@ -153,7 +153,7 @@ def test_a_chain_away_from_its_stations_is_said_to_be(folder: Path) -> None:
     links = links_of(scenario)
     far = summarise_chain(
         load_scenario("chain5-turtlebot3", [*GIVEN, "formation.rho_0=0.3"]),
-        [evidence_of_link(log, link) for link in links],
+        [run_data_of_link(log, link) for link in links],
     )
     assert far["recovered"] is False
     assert all("settle_s" not in pair for pair in far["pairs"])

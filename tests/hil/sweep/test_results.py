@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pyarrow import parquet
 
 from hil.errors import UsageError
-from hil.judge.evidence import evidence_of_log
+from hil.judge.run_data import run_data_of_log
 from hil.judge.summary import summarise
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import read_log
@@ -72,7 +72,7 @@ def test_a_cell_of_one_run_has_the_figures_of_its_lockstep_run(
     for cell, found in zip(sweep.cells(), flown(sweep, tmp_path)["cells"], strict=True):
         log = tmp_path / f"{cell.index}.mcap"
         run_lockstep(sweep.scenario_of(cell, run_seed(sweep.spec.seed, 0)), log)
-        wanted = summarise(evidence_of_log(read_log(log)))
+        wanted = summarise(run_data_of_log(read_log(log)))
         estimation, bounds = wanted["estimation"], wanted["bounds"]
         assert found["samples"] == estimation["samples"]
         for name in ("rmse", "coverage_3sigma", "efficiency"):
