@@ -12,7 +12,7 @@ from hil.judge.certified import certified_violations
 from hil.judge.run_data import RunData, run_data_of_link, run_data_of_log
 from hil.log.metadata import IMPORT, mode_of, version_of
 from hil.log.reader import Log
-from hil.replay.journal import Parity
+from hil.replay.re_execution import Parity
 from hil.replay.rerun import Replay
 from hil.scenario.certify import same_steps
 from hil.scenario.links import Link
