@@ -13,7 +13,7 @@ from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import FrontEnd, PairSeen, from_sensor, measure_body
 from estimation.own_motion.odometry_correction import (
     NOTHING_SEEN,
-    OdometryWatch,
+    OdometryComparison,
     reconsidered,
     with_pose,
     with_sample,
@@ -76,7 +76,7 @@ class EstimatorState(Struct, frozen=True):
     """
 
     memory: EstimatorMemory
-    watch: OdometryWatch = NOTHING_SEEN
+    watch: OdometryComparison = NOTHING_SEEN
     times: HostTime = HostTime()
     believed: Believed = Believed()
     receipts: tuple[Receipt, ...] = ()
