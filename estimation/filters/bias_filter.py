@@ -144,7 +144,7 @@ def _aged(excitation: Excitation, share: float) -> Excitation:
         share * excitation.sight,
         share * excitation.own,
         share * excitation.own_squared,
-        share * excitation.doubt,
+        share * excitation.direction_variance,
     )
 
 
@@ -166,5 +166,5 @@ def _with_moment(excitation: Excitation, belief: Belief, v2: float) -> Excitatio
         excitation.sight + sight,
         excitation.own + v2 * leader.conjugate(),
         excitation.own_squared + v2 * v2,
-        excitation.doubt + sd_heading**2,
+        excitation.direction_variance + sd_heading**2,
     )

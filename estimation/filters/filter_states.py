@@ -73,20 +73,20 @@ class Excitation:
     """How much a pair has moved against each other of late, as weighted sums over its moments.
 
     In the frame along the leader's velocity: ``sight`` of the unit vectors to the leader, ``own`` of the
-    follower's velocities [m/s], both as x + iy; ``own_squared`` of their squared lengths; ``doubt`` of the
-    variances [rad^2] with which the leader's direction was known.
+    follower's velocities [m/s], both as x + iy; ``own_squared`` of their squared lengths;
+    ``direction_variance`` of the variances [rad^2] with which the leader's direction was known.
     """
 
     weight: float = 0.0
     sight: complex = 0.0
     own: complex = 0.0
     own_squared: float = 0.0
-    doubt: float = 0.0
+    direction_variance: float = 0.0
 
     @property
     def sd_direction(self) -> float:
         """Root mean square [rad] of how well the leader's direction was known; infinite without a moment."""
-        return math.sqrt(self.doubt / self.weight) if self.weight > 0.0 else math.inf
+        return math.sqrt(self.direction_variance / self.weight) if self.weight > 0.0 else math.inf
 
     @property
     def sight_spread(self) -> float:

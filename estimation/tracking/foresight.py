@@ -113,8 +113,8 @@ class Foresight(NamedTuple):
         that of u1, so that E counts (1 + mu1 D / 2)^2 times. Taken is 1.5 for all, its value for mu1 = 1.5
         per second and D = 0.3 s.
         """
-        doubt = held(self, variance, ahead) / self.spread
-        return max(0.0, 1.0 - _ERRORS_TOGETHER * doubt * doubt)
+        ratio = held(self, variance, ahead) / self.spread
+        return max(0.0, 1.0 - _ERRORS_TOGETHER * ratio * ratio)
 
 
 @kernel

@@ -117,8 +117,8 @@ def why_not_same(log: Log, played: Replay) -> str:
         # Whatever was consumed in the meantime, its receipts went by too.
         lost = lost or f"the log has nothing of {gap_s:.1f} s before: nobody can repeat what it misses"
     reasons = [reason for reason in (lost, _other_version(log)) if reason]
-    doubt = "did every daemon run with the recorder's scenario, and with this version of abreast?"
-    return f"log {log.path}: {', '.join(wrong)}; {'; '.join(reasons) or doubt}"
+    question = "did every daemon run with the recorder's scenario, and with this version of abreast?"
+    return f"log {log.path}: {', '.join(wrong)}; {'; '.join(reasons) or question}"
 
 
 def _other_version(log: Log) -> str:

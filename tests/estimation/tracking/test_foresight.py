@@ -80,7 +80,7 @@ def test_no_more_is_foreseen_than_the_leader_can_turn(u1: list[float], variance:
 
 
 @given(variances, variances, st.floats(0.0, 2.0))
-def test_the_more_doubt_the_less_is_fed_forward(one: float, other: float, ahead: float) -> None:
+def test_the_more_uncertain_the_less_is_fed_forward(one: float, other: float, ahead: float) -> None:
     less, more = sorted((one, other))
     assert 1.0 >= SIGHT.weight(less, ahead) >= SIGHT.weight(more, ahead) >= 0.0
     assert SIGHT.weight(0.0, 0.0) == 1.0
