@@ -329,6 +329,6 @@ def folded(track: Rows[OwnPoint], ring: Ring, due: OwnPoint, noise: OwnNoise, sp
 
 
 @kernel
-def retold(point: OwnPoint, odometry: FollowerMotion, noise: OwnNoise) -> OwnPoint:
+def own_reprocessed(point: OwnPoint, odometry: FollowerMotion, noise: OwnNoise) -> OwnPoint:
     """A point's pose, begun anew with the odometry that is now known of its moment."""
     return own_begun(point.capture_ns, point.pose, True, odometry, noise)

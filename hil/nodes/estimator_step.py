@@ -37,7 +37,7 @@ from estimation.own_motion.own_track import (
     own_followed,
     own_place,
     own_point,
-    retold,
+    own_reprocessed,
 )
 from estimation.tracking.estimate import Estimate, estimate_at
 from estimation.tracking.follower_check import BELIEVED
@@ -257,7 +257,7 @@ def _own_again(known: Known, memory: Memory, rules: Rules, since_ns: int) -> Non
     first = max(1, own_place(memory.own, ring, since_ns))
     for k in range(first, ring.length):
         due = own_point(memory.own, ring, k)
-        due = retold(due, by_odometry(known, memory, rules, due.capture_ns), noise)
+        due = own_reprocessed(due, by_odometry(known, memory, rules, due.capture_ns), noise)
         point = own_followed(own_point(memory.own, ring, k - 1), due, noise)
         store(memory.own, place(ring, memory.own, k), point)
 
