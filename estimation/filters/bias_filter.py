@@ -54,7 +54,7 @@ class BiasedExtended(Estimator):
     def start(self, measurement: Measurement) -> Belief:
         """Belief from the first measurement alone, which knows the position up to the offsets."""
         base = self.model.start(measurement)
-        _, by_position, by_offset = _foreseen(base.mean, np.zeros(2))
+        _, by_position, by_offset = _predicted(base.mean, np.zeros(2))
         back = -np.linalg.solve(by_position, by_offset)
         covariance = base.covariance.copy()
         covariance[0:2, 0:2] += (back * self._prior) @ back.T
@@ -89,7 +89,7 @@ class BiasedExtended(Estimator):
 
     def _taken_in(self, belief: Belief, measurement: Measurement, gate: float) -> tuple[Belief, float]:
         offsets = offsets_of(belief)
-        seen, by_position, by_offset = _foreseen(belief.mean, offsets.mean)
+        seen, by_position, by_offset = _predicted(belief.mean, offsets.mean)
         joint = np.block([[belief.covariance, offsets.cross], [offsets.cross.T, offsets.covariance]])
         slope = np.zeros((2, _ROWS))
         slope[:, 0:2], slope[:, STATE_SIZE:] = by_position, by_offset
@@ -126,7 +126,7 @@ def offsets_of(belief: Belief) -> SensorOffsets:
     return belief.filter_state
 
 
-def _foreseen(mean: Vector, offsets: Vector) -> tuple[Vector, Matrix, Matrix]:
+def _predicted(mean: Vector, offsets: Vector) -> tuple[Vector, Matrix, Matrix]:
     """Position (2,) that the sensor shows of the leader, its slopes (2, 2) by position and by the offsets."""
     x, y = mean[0:2].tolist()
     rho = max(math.hypot(x, y), 1e-6)

@@ -73,19 +73,19 @@ class MovingHorizon(Estimator):
     def _solved(self, horizon: Horizon) -> tuple[list[Vector], Matrix]:
         """States of the window (n of (5,)) by one Gauss-Newton step, and the last one's covariance (5, 5)."""
         mean, covariance = _seen(horizon.stages[0], horizon.mean, horizon.covariance)
-        known, foreseen, spreads, shared = [mean], [], [], []
+        known, predicted, spreads, shared = [mean], [], [], []
         for before, stage in pairwise(horizon.stages):
             ahead, spread, cross = self._moved(before, stage, mean, covariance)
             mean, covariance = _seen(stage, ahead, spread)
             known.append(mean)
-            foreseen.append(ahead)
+            predicted.append(ahead)
             spreads.append(spread)
             shared.append(cross)
         states = [mean]
         if shared:
             gains = np.linalg.solve(np.stack(spreads), np.stack(shared)).transpose(0, 2, 1)
             for k in range(len(gains) - 1, -1, -1):
-                states.append(known[k] + gains[k] @ (states[-1] - foreseen[k]))
+                states.append(known[k] + gains[k] @ (states[-1] - predicted[k]))
         return states[::-1], covariance
 
     def _without_oldest(self, horizon: Horizon) -> Horizon:

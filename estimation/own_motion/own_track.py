@@ -284,7 +284,7 @@ def own_place(track: Rows[OwnPoint], ring: Ring, capture_ns: int) -> int:
 
 
 @kernel
-def foreseen(track: Rows[OwnPoint], ring: Ring, due: OwnPoint, noise: OwnNoise) -> OwnPoint:
+def own_predicted(track: Rows[OwnPoint], ring: Ring, due: OwnPoint, noise: OwnNoise) -> OwnPoint:
     """Point that the pose of ``due`` would become at its place, without putting it there.
 
     That of the track for a moment that it has; ``due`` itself for one from before it began.

@@ -31,12 +31,12 @@ from estimation.own_motion.own_track import (
     OwnNoise,
     OwnPoint,
     folded,
-    foreseen,
     motion_of,
     own_begun,
     own_followed,
     own_place,
     own_point,
+    own_predicted,
     own_reprocessed,
 )
 from estimation.tracking.estimate import Estimate, estimate_at
@@ -149,7 +149,7 @@ def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen
         motion = by_odometry(known, memory, rules, capture_ns)
         return take(known, memory, rules, measured(rules, capture_ns, seen, motion))
     due = due_pose(known, memory, rules, capture_ns, seen)
-    motion = motion_of(foreseen(memory.own, known.own, due, rules.own_noise))
+    motion = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
     if known.own.length > 0 and capture_ns < own_point(memory.own, known.own, 0).capture_ns:
         motion = by_odometry(known, memory, rules, capture_ns)
     taken = take(known, memory, rules, measured(rules, capture_ns, seen, motion))

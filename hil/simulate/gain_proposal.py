@@ -22,9 +22,9 @@ from hil.scenario.schema import Scenario
 def task_of(scenario: Scenario) -> Task:
     """What a scenario asks of a follower, its estimates as good as a filter in its steady state makes them.
 
-    The filter of :mod:`estimation.tracking.foresight` on positions of standard deviation sigma has the corner
-    w0 = (v^2 q / (sigma^2 / rate))^(1/6) and the variance 3 w0^3 sigma^2 / rate of the leader's velocity.
-    Raises :class:`UsageError` for a station that is not abreast: the bounds hold there only.
+    The filter of :mod:`estimation.tracking.turn_prediction` on positions of standard deviation sigma has the
+    corner w0 = (v^2 q / (sigma^2 / rate))^(1/6) and the variance 3 w0^3 sigma^2 / rate of the leader's
+    velocity. Raises :class:`UsageError` for a station that is not abreast: the bounds hold there only.
     """
     if scenario.formation.bearing != ABREAST_ALPHA2:
         raise UsageError(

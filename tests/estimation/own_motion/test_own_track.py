@@ -15,12 +15,12 @@ from estimation.own_motion.own_track import (
     OwnNoise,
     OwnPoint,
     folded,
-    foreseen,
     motion_of,
     own_begun,
     own_followed,
     own_place,
     own_point,
+    own_predicted,
 )
 from formation.angles import wrap
 from formation.pose import Pose, advance
@@ -160,7 +160,7 @@ def test_the_track_keeps_its_span_and_knows_the_moments_of_its_poses() -> None:
 
 
 @pytest.mark.parametrize("k", [0, 1, 5, 59, 60])
-def test_what_a_pose_would_become_is_foreseen_without_putting_it_there(k: int) -> None:
+def test_what_a_pose_would_become_is_predicted_without_putting_it_there(k: int) -> None:
     poses = driven(61, 0.08, 0.2)
     track = OwnTrack()
     for number, pose in enumerate(poses[:60]):
@@ -168,7 +168,7 @@ def test_what_a_pose_would_become_is_foreseen_without_putting_it_there(k: int) -
             track.fold(number * FRAME_NS, pose)
     due = own_begun(k * FRAME_NS, poses[k], False, UNTOLD, NOISE)
     before, ring = columns_of(track.rows).tobytes(), track.ring
-    found = foreseen(track.rows, ring, due, NOISE)
+    found = own_predicted(track.rows, ring, due, NOISE)
     assert (columns_of(track.rows).tobytes(), track.ring) == (before, ring)
     if k == 0:
         assert found == due
@@ -178,7 +178,7 @@ def test_what_a_pose_would_become_is_foreseen_without_putting_it_there(k: int) -
     assert found == own_point(track.rows, track.ring, at)
     # A moment that the track has is told as the track has it, whatever comes with it now.
     again = own_begun(k * FRAME_NS, Pose(7.0, 7.0, 0.0), False, UNTOLD, NOISE)
-    assert foreseen(track.rows, track.ring, again, NOISE) == found
+    assert own_predicted(track.rows, track.ring, again, NOISE) == found
 
 
 def test_more_poses_than_there_is_room_for_shorten_the_track_and_nothing_else() -> None:
