@@ -172,9 +172,9 @@ def inject(
             continue
         last = shown = frame.pair
         seen = PairSeen(shown.leader.x, shown.leader.y, shown.follower)
-        outcome, told = memory.take_frame(capture_ns, seen), memory.estimate(capture_ns)
-        assert told is not None
-        found = told.estimate
+        outcome, newest = memory.take_frame(capture_ns, seen), memory.estimate(capture_ns)
+        assert newest is not None
+        found = newest.estimate
         score.frames += 1
         score.rejected += outcome.verdict == GATED
         if t < settling or found.status != Status.TRACKING:

@@ -99,7 +99,9 @@ class BiasedExtended(Estimator):
         if not nis <= gate:
             return belief, nis
         gain = np.linalg.solve(spread, slope @ joint).T
-        gain[STATE_SIZE:][[not told for told in (offsets.range_told, offsets.bearing_told)]] = 0.0
+        gain[STATE_SIZE:][
+            [not observable for observable in (offsets.range_observable, offsets.bearing_observable)]
+        ] = 0.0
         mean = np.concatenate([belief.mean, offsets.mean]) + gain @ residual
         rest = np.eye(_ROWS) - gain @ slope
         after = rest @ joint @ rest.T + gain @ measurement.covariance @ gain.T
@@ -113,8 +115,8 @@ class BiasedExtended(Estimator):
         known = replace(
             known,
             excitation=excited,
-            range_told=excited.sight_spread > sure,
-            bearing_told=excited.own_spread > sure,
+            range_observable=excited.sight_spread > sure,
+            bearing_observable=excited.own_spread > sure,
         )
         return updated._replace(filter_state=known), nis
 

@@ -107,13 +107,13 @@ class Excitation:
 class SensorOffsets:
     """Offsets (2,) of a sensor's range [m] and bearing [rad], measured minus true.
 
-    covariance: (2, 2). cross: (5, 2), with the leader's states. range_told, bearing_told: whether the pair
-    moves so that they can be told; until then they are left as they are.
+    covariance: (2, 2). cross: (5, 2), with the leader's states. range_observable, bearing_observable: whether
+    the pair moves so that they can be told; until then they are left as they are.
     """
 
     mean: Vector
     covariance: Matrix
     cross: Matrix
     excitation: Excitation = Excitation()
-    range_told: bool = False
-    bearing_told: bool = False
+    range_observable: bool = False
+    bearing_observable: bool = False

@@ -75,9 +75,9 @@ def certified_violations(summary: Mapping[str, Any]) -> dict[str, int]:
 def _verdict(radius: FloatArray, error: FloatArray) -> Mapping[str, float]:
     if not len(radius):
         return {}
-    told = {"median": float(np.median(radius)), "largest": float(np.max(radius))}
+    figures = {"median": float(np.median(radius)), "largest": float(np.max(radius))}
     judged = np.isfinite(error)
     if not np.any(judged):
-        return told
+        return figures
     ratio = error[judged] / np.maximum(radius[judged], 1e-12)
-    return told | {"violations": int(np.count_nonzero(ratio > 1.0)), "tightness": float(np.max(ratio))}
+    return figures | {"violations": int(np.count_nonzero(ratio > 1.0)), "tightness": float(np.max(ratio))}

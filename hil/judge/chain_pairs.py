@@ -78,12 +78,12 @@ def driven_trajectory(runs: Sequence[RunData]) -> ChainTrajectory | None:
     where it was told to stand what it drove.
     """
     span = run_span(runs[0])
-    told = [TrueStates.of(run_data.truth) for run_data in runs]
-    moments_ns = told[0].capture_ns
-    for each in told[1:]:
+    truths = [TrueStates.of(run_data.truth) for run_data in runs]
+    moments_ns = truths[0].capture_ns
+    for each in truths[1:]:
         moments_ns = np.intersect1d(moments_ns, each.capture_ns)
     moments_ns = moments_ns[(moments_ns >= span.from_ns) & (moments_ns <= span.to_ns)]
-    pairs = [each.at(moments_ns) for each in told]
+    pairs = [each.at(moments_ns) for each in truths]
     rho = np.column_stack([each.rho for each in pairs])
     if len(moments_ns) < 2 or not np.all(np.isfinite(rho)):
         return None

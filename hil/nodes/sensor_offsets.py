@@ -19,6 +19,6 @@ def offsets_report(belief: Gaussian) -> dict[str, object]:
     report: dict[str, object] = {name: f"{value:.4f}" for name, value in zip(names, values, strict=True)}
     still = "off: the line of sight does not turn against the leader"
     steady = "off: the follower's velocity does not change against the leader's"
-    report["range_bias_state"] = "estimated" if known.range_told else still
-    report["bearing_bias_state"] = "estimated" if known.bearing_told else steady
+    report["range_bias_state"] = "estimated" if known.range_observable else still
+    report["bearing_bias_state"] = "estimated" if known.bearing_observable else steady
     return report

@@ -88,8 +88,8 @@ def _course(
     hover(plot, draw_line(plot, source, "y", BELIEVED, width=1.1), tips)
     says = f"{quantity.says} as estimated"
     if len(true):
-        told = table(data.seconds(truth.capture_ns[known]), true, {"y": true})
-        draw_line(plot, told, "y", TRUE)
+        truth_table = table(data.seconds(truth.capture_ns[known]), true, {"y": true})
+        draw_line(plot, truth_table, "y", TRUE)
         keys.append(Key("truth", TRUE))
         says += ", and as it was"
     bound = _bound(data, quantity.name) if judged else None

@@ -114,9 +114,9 @@ def table(t: FloatArray, by: FloatArray, columns: Mapping[str, FloatArray]) -> C
     """Columns over time, decimated by the peaks of ``by`` and broken where the time jumps."""
     holes = np.flatnonzero(np.diff(t) > LONGEST_LINE) + 1
     rows = decimated_rows(np.insert(by, holes, math.nan))
-    told = {name: np.insert(values, holes, math.nan)[rows] for name, values in columns.items()}
+    decimated = {name: np.insert(values, holes, math.nan)[rows] for name, values in columns.items()}
     return ColumnDataSource(
-        {"t": np.insert(t, holes, t[holes])[rows]} | {k: _short(v) for k, v in told.items()}
+        {"t": np.insert(t, holes, t[holes])[rows]} | {k: _short(v) for k, v in decimated.items()}
     )
 
 

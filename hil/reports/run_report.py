@@ -77,12 +77,14 @@ def _head(summary: Mapping[str, Any]) -> str:
         verdict = "Nothing speaks against it."
     colour = "verdict bad" if broken else "verdict"
     listed = "".join(f"<li>{escape(warning)}</li>" for warning in warnings)
-    told = "".join(f"<dt>{escape(name)}</dt>{_finding(finding, style)}" for name, finding, style in lines)
+    report_lines = "".join(
+        f"<dt>{escape(name)}</dt>{_finding(finding, style)}" for name, finding, style in lines
+    )
     return (
         f"<h1>{escape(' · '.join(_names(summary)))}</h1>\n"
         f'<div class="{colour}"><p><strong>{escape(verdict)}</strong></p>'
         + (f"<ul>{listed}</ul>" if listed else "")
-        + f"</div>\n<dl>{told}</dl>\n"
+        + f"</div>\n<dl>{report_lines}</dl>\n"
     )
 
 

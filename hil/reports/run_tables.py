@@ -58,7 +58,7 @@ _COUNTS = {
 }
 _MOST_STOPS = 20
 _CERTIFICATE, _WORDS = "certificate", ("why", "assumes")
-_TOLD = (
+_HEAD = (
     "scenario",
     "seed",
     "mode",
@@ -75,7 +75,7 @@ _TOLD = (
 def summary_tables(summary: Mapping[str, Any]) -> str:
     """Tables of all figures of a summary, with units; what the summary lacks is not there."""
     left = dict(_leaves(summary, ""))
-    for name in _TOLD:
+    for name in _HEAD:
         left.pop(name, None)
     tables = [_quality(left), _bounds(left)]
     for group, caption in _COUNTS.items():

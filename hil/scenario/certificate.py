@@ -81,8 +81,8 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
 
 
 def _claim_json(claim: Claim) -> dict[str, Any]:
-    told: dict[str, Any] = {**claim.figures, "assumes": list(claim.assumes)}
-    return told if claim.why is None else told | {"why": claim.why}
+    entry: dict[str, Any] = {**claim.figures, "assumes": list(claim.assumes)}
+    return entry if claim.why is None else entry | {"why": claim.why}
 
 
 _TITLES = {

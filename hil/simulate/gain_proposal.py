@@ -84,7 +84,7 @@ def _outcome(found: Design, gains: tuple[float, float, float], task: Task) -> di
     }
 
 
-def told(proposal: dict[str, Any]) -> Iterator[str]:
+def report_lines(proposal: dict[str, Any]) -> Iterator[str]:
     """The proposal as lines of text."""
     gains = proposal["gains"]
     if gains is None:

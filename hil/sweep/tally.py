@@ -113,8 +113,8 @@ def true_states(flown: Flown, k: int, span: Span) -> TrueStates:
     rows = flown.truth[k :: flown.pairs]
     moments_ns = rows["at_ns"] - flown.since_ns
     rows = rows[np.searchsorted(moments_ns, span.from_ns) : np.searchsorted(moments_ns, span.to_ns, "right")]
-    told = np.column_stack([rows[body][name] for body, name in _TRUE])
-    return TrueStates.along(rows["at_ns"] - flown.since_ns, told)
+    recorded = np.column_stack([rows[body][name] for body, name in _TRUE])
+    return TrueStates.along(rows["at_ns"] - flown.since_ns, recorded)
 
 
 def _estimates(flown: Flown, k: int) -> EstimateColumns:

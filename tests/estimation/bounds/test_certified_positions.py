@@ -31,7 +31,7 @@ def test_the_truth_is_always_within_what_is_certain(
     """Leaders that turn as hard as they may, one way and the other, positions as wrong as they may be."""
     random = np.random.default_rng(seed)
     turn, heading, leader = K_U * random.choice([-1.0, 1.0]), random.uniform(-math.pi, math.pi), 0.0 + 0.0j
-    known, told = NOTHING_RECENT, 0
+    known, certified = NOTHING_RECENT, 0
     dt, drift = STEP_NS * 1e-9, random.uniform(-9.0, 9.0)
     for frame in range(120):
         turn = -turn if frame in switches else turn
@@ -53,10 +53,10 @@ def test_the_truth_is_always_within_what_is_certain(
         if found is Failed.GAP:
             continue
         assert not isinstance(found, Failed)
-        told += 1
+        certified += 1
         assert abs(v1 - found.v1.centre) <= found.v1.half + ROUNDING
         assert abs(wrap(-1.2 - found.alpha1.centre)) <= found.alpha1.half + ROUNDING
-    assert told > 20
+    assert certified > 20
 
 
 def straight(frames: int) -> Recent:

@@ -66,11 +66,11 @@ def test_the_truth_is_always_within_what_is_certain(
     line = (leader - follower - 0.25j * np.exp(1j * heading[0]))[::FINE]
     heading, own = heading[::FINE], own[::FINE]
     wrong = np.ones((4, len(ticks))) if edge else random.random((4, len(ticks)))
-    told_v = v2 + signs[0] * wrong[0] * ERRORS.M_v2
-    told_u = u2 + signs[1] * wrong[1] * ERRORS.M_u2
+    odometry_v = v2 + signs[0] * wrong[0] * ERRORS.M_v2
+    odometry_u = u2 + signs[1] * wrong[1] * ERRORS.M_u2
     odometry = tuple(
         MotionSample(EPOCH_NS + tick * STEP_NS, v, u)
-        for tick, v, u in zip(ticks.tolist(), told_v.tolist(), told_u.tolist(), strict=True)
+        for tick, v, u in zip(ticks.tolist(), odometry_v.tolist(), odometry_u.tolist(), strict=True)
     )
     either = random.choice([-1.0, 1.0], (2, len(ticks)))
     rho = np.abs(line) + either[0] * wrong[2] * ERRORS.E_rho

@@ -76,9 +76,9 @@ def reported(given: Estimate) -> Reported:
 
 @entry
 def predicted_line(
-    told: Reported, rows: Rows[SentCommand], sent: Ring, until_ns: int, lag: float, further: float
+    report: Reported, rows: Rows[SentCommand], sent: Ring, until_ns: int, lag: float, further: float
 ) -> Line:
-    return predicted(sight_of(told), borrowed(rows), sent, until_ns, lag, further)
+    return predicted(sight_of(report), borrowed(rows), sent, until_ns, lag, further)
 
 
 def predict_shape(

@@ -42,8 +42,10 @@ def test_certifying_leaves_estimates_and_commands_as_they_were(short_log: Log, r
     assert plain.mismatched == 0
     assert len(plain.estimates) == len(run_data.estimates) == len(run_data.certified)
     assert len(plain.commands) == len(run_data.commands)
-    told = [(each.header.stamp, each.computed, each.v1, each.alpha1) for each in run_data.estimates]
-    assert told == [(each.header.stamp, each.computed, each.v1, each.alpha1) for each in run_data.certified]
+    estimated = [(each.header.stamp, each.computed, each.v1, each.alpha1) for each in run_data.estimates]
+    assert estimated == [
+        (each.header.stamp, each.computed, each.v1, each.alpha1) for each in run_data.certified
+    ]
 
 
 def test_errors_beyond_a_radius_are_counted(run_data: RunData) -> None:

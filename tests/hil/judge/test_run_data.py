@@ -138,9 +138,9 @@ def test_what_cannot_be_is_left_out_whoever_has_sent_it(short_log: Log, tmp_path
 
 def test_counts_that_are_none_are_left_out(tmp_path: Path) -> None:
     odd = {"taken.used": "many", "taken.frames": "9" * 5000, "refused.gated": "-1", "motion_since_ns": "soon"}
-    told = [msg.KeyValue(key=key, value=value) for key, value in odd.items()]
+    values = [msg.KeyValue(key=key, value=value) for key, value in odd.items()]
     nodes = [
-        msg.DiagnosticStatus(level=0, name=name, message="", hardware_id="", values=told)
+        msg.DiagnosticStatus(level=0, name=name, message="", hardware_id="", values=values)
         for name in ("abreast/estimator", "abreast/emulator")
     ]
     report = msg.DiagnosticArray(header=header(1, ""), status=nodes)

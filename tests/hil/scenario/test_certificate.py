@@ -27,8 +27,8 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[str, s
     with pytest.raises(SystemExit) as ended:
         main(["bounds", *arguments])
     assert ended.value.code == 0
-    told = capsys.readouterr()
-    return told.out, told.err
+    captured = capsys.readouterr()
+    return captured.out, captured.err
 
 
 def test_json_has_the_keys_of_the_contract_and_what_each_rests_on(capsys: pytest.CaptureFixture[str]) -> None:
