@@ -25,8 +25,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from formation.angles import wrap
 from hil.emulator.node import EmulatorState
-from hil.judge.evidence import Span
 from hil.judge.noise_free_orbit import noise_free_orbit
+from hil.judge.run_data import Span
 from hil.judge.true_states import TrueStates
 from hil.lockstep.lockstep import EPOCH_NS, Lockstep
 from hil.lockstep.run import make_nodes, run_lockstep

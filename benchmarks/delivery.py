@@ -67,8 +67,8 @@ def messages(seed: int, seconds: float) -> Sent:
         sent.append((at_ns, Event(topics.RIGID_BODIES, encode(frame))))
         if at_ns >= next_odometry_ns:
             measured = Motion(own.v + shake[5], own.u + shake[6])
-            told = odometry_message(EPOCH_NS + at_ns, "follower", follower, measured)
-            sent.append((at_ns, Event("follower/odom", encode(told))))
+            odometry = odometry_message(EPOCH_NS + at_ns, "follower", follower, measured)
+            sent.append((at_ns, Event("follower/odom", encode(odometry))))
             next_odometry_ns += ODOMETRY_NS
         leader = advance(leader, led.v, led.u, FRAME_NS * 1e-9)
         follower = advance(follower, own.v, own.u, FRAME_NS * 1e-9)
@@ -99,9 +99,9 @@ def delivered(node: EstimatorNode, parts: list[list[Event]]) -> tuple[list[Estim
         now_ns = EPOCH_NS + number * HORIZON_NS
         for event in events:
             state, _ = node.step(state, event, now_ns)
-        told = state.memory.estimate(now_ns)
-        assert told is not None
-        found.append(told.estimate)
+        newest = state.memory.estimate(now_ns)
+        assert newest is not None
+        found.append(newest.estimate)
     return found, state.taken.get("late", 0)
 
 

@@ -10,8 +10,9 @@ their own standard deviations off the truth, how many v1 or alpha1 outside the e
 with them, frames rejected, and how long after the fault's end it takes until TRACKING: median, p99, maximum,
 and the share that takes more than half a second, or does not come back at all within a second.
 
-For a step that stays, its end is the step itself. While such a jump is in doubt the estimate is judged by the
-truth, and thereafter by what mocap shows: nobody can know a body that stays where it jumped to be elsewhere.
+For a step that stays, its end is the step itself. While such a jump is uncertain the estimate is judged by
+the truth, and thereafter by what mocap shows: nobody can know a body that stays where it jumped to be
+elsewhere.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ SETTLING, AFTER = 1.0, 1.2
 VARIETY = 0.5
 """Seconds within which the instant of a fault is drawn."""
 STAYS = 1e6
-"""Duration [s] of a step that stays; what follows is judged for the time of doubt and a second more."""
+"""Duration [s] of a step that stays; what follows is judged for the time of uncertainty and a second more."""
 
 Body = Literal["leader", "follower", "both"]
 Make = Callable[[np.random.Generator, float], FaultSection]
@@ -157,8 +158,8 @@ def inject(
     stays = fault is not None and fault.duration_s == STAYS
     at = settling if fault is None else fault.at_s
     end = at if fault is None or stays else at + max(fault.duration_s, PERIOD)
-    doubted = end + node.rules.step.settings.doubt_for
-    until = doubted + 1.0 if stays else end + after
+    uncertain_until = end + node.rules.step.settings.jump_uncertain_for
+    until = uncertain_until + 1.0 if stays else end + after
     memory = node.begin(0).memory
     last: Pair | None = None
     back = math.inf
@@ -183,7 +184,7 @@ def inject(
         if t >= end - 1e-9:
             back = min(back, t - end)
         pair = moment.pair
-        if stays and fault is not None and t > doubted and found.jump == NO_JUMP:
+        if stays and fault is not None and t > uncertain_until and found.jump == NO_JUMP:
             pair = faulty(fault_rows([fault]), t, PERIOD, pair, pair).pair
         errors = errors_of(found, pair, moment.leader, moment.follower)
         sd = np.sqrt(np.diagonal(found.covariance)).tolist()

@@ -106,8 +106,8 @@ def main() -> None:
             peer, loop, call = 1e6 * np.median(took, axis=0)
             ratios = [float(np.median(took[:, 0] / took[:, k])) for k in (1, 2)]
             times = f"{peer:6.1f} us  {1e3 * loop:6.1f} ns  {1e3 * call:6.1f} ns"
-            told = f"{ratios[0]:12.0f}x  {in_loop:5.0f}x  {ratios[1]:13.0f}x  {by_call:5.0f}x"
-            print(f"{kind.name.lower():6}  {model.front_end.value:5}  {times}  {told}")
+            ratio_columns = f"{ratios[0]:12.0f}x  {in_loop:5.0f}x  {ratios[1]:13.0f}x  {by_call:5.0f}x"
+            print(f"{kind.name.lower():6}  {model.front_end.value:5}  {times}  {ratio_columns}")
 
 
 if __name__ == "__main__":

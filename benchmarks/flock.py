@@ -84,8 +84,8 @@ def plain(agents: int, steps: int, step: float) -> FloatArray:
             pose, motion = virtual_leader([agents_at[k] for k in whom], [motions[k] for k in whom])
             shape = shape_of(pose, agents_at[agent])
             motions.append(LAWS["independent"](shape, motion.v, motion.u, gains[agent], LIMITS))
-        told = zip(agents_at, motions, strict=True)
-        return np.array([(m.v * math.cos(a.theta), m.v * math.sin(a.theta), m.u) for a, m in told])
+        agents_motions = zip(agents_at, motions, strict=True)
+        return np.array([(m.v * math.cos(a.theta), m.v * math.sin(a.theta), m.u) for a, m in agents_motions])
 
     for k in range(steps):
         t = k * step

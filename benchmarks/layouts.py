@@ -36,9 +36,9 @@ def read_odometry(payload: bytes) -> Odometry:
 
 
 @entry
-def write_odometry(buffer: Buffer, numbers_at: int, stamp_ns: int, told: Odometry) -> None:
+def write_odometry(buffer: Buffer, numbers_at: int, stamp_ns: int, odometry: Odometry) -> None:
     """Fill :func:`hil.wire.templates.odometry_template`."""
-    odometry_layout.write_odometry(buffer, numbers_at, stamp_ns, told)
+    odometry_layout.write_odometry(buffer, numbers_at, stamp_ns, odometry)
 
 
 @entry

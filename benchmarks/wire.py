@@ -90,7 +90,7 @@ def frames() -> dict[str, tuple[Callable[[], object], Callable[[], object]]]:
 
 def motions() -> dict[str, tuple[Callable[[], object], Callable[[], object]]]:
     odometry = encode(odometry_message(NOW_NS, "follower", PAIR[1], Motion(0.1, 0.2)))
-    own, told = (
+    own, sample = (
         templates.odometry_template("follower/odom", "follower/base_footprint"),
         Odometry(True, Stamp(0, 0), upright(PAIR[1]), 0.1, 0.2),
     )
@@ -98,7 +98,7 @@ def motions() -> dict[str, tuple[Callable[[], object], Callable[[], object]]]:
     command = encode(drive_message(Motion(0.1, 0.2), NOW_NS, "follower", stamped=True))
 
     def write_odometry() -> bytes:
-        layouts.write_odometry(own.buffer, own.numbers_at, NOW_NS, told)
+        layouts.write_odometry(own.buffer, own.numbers_at, NOW_NS, sample)
         return own.buffer.tobytes()
 
     def write_drive() -> bytes:

@@ -182,4 +182,4 @@ def independent(shape: Shape, v1: float, u1: float, gains: Gains, limits: Limits
 LAWS: Mapping[str, Law] = MappingProxyType(
     {"independent": independent, "ideal": ideal, "feedforward": ideal, "faded": ideal}
 )
-"""Laws by name. The last three are one, but for where u1 is from (:mod:`estimation.tracking.foresight`)."""
+"""Laws by name. The last three differ in where u1 is from: :mod:`estimation.tracking.turn_prediction`."""

@@ -1,4 +1,4 @@
-"""The console script ``abreast``: finds the command, and turns every foreseen error into one line."""
+"""The console script ``abreast``: finds the command, and turns every expected error into one line."""
 
 from __future__ import annotations
 

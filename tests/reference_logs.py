@@ -88,14 +88,14 @@ def hardware() -> dict[str, str]:
 
 def written_on() -> dict[str, str]:
     """What :func:`hardware` gave, and our version, where the logs were written."""
-    told: dict[str, str] = json.loads(WRITTEN_ON.read_text(encoding="utf-8"))
-    return told
+    written: dict[str, str] = json.loads(WRITTEN_ON.read_text(encoding="utf-8"))
+    return written
 
 
 def same_hardware() -> bool:
     """Whether outputs must be those of the logs to the bit here."""
-    told = written_on()
-    return all(told.get(key) == value for key, value in hardware().items())
+    written = written_on()
+    return all(written.get(key) == value for key, value in hardware().items())
 
 
 def flown_anew(log: Log, folder: Path, *, exactly: bool) -> list[str]:
@@ -136,8 +136,8 @@ def renew() -> None:
             for line in lines:
                 click.echo(f"{name}: {line}")
             kept.write_bytes(new.read_bytes())
-    told = {"abreast": __version__, **hardware()}
-    WRITTEN_ON.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+    written = {"abreast": __version__, **hardware()}
+    WRITTEN_ON.write_text(json.dumps(written, indent=2) + "\n", encoding="utf-8")
 
 
 def _in_place_of(recorded: Sequence[Sent], outputs: Sequence[Message]) -> list[Sent]:

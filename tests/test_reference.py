@@ -34,7 +34,7 @@ from tests.reference_logs import (
 LARGEST_BYTES = 150_000
 
 
-def told(name: str, lines: list[str]) -> str:
+def difference_report(name: str, lines: list[str]) -> str:
     """What to say of differences."""
     version = written_on()["abreast"]
     renewing = "if that is meant to be so, scripts/renew-reference keeps the new ones"
@@ -44,13 +44,13 @@ def told(name: str, lines: list[str]) -> str:
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_the_nodes_make_the_same_of_recorded_inputs(name: str) -> None:
     lines = replayed(read_log(path_of(name)), exactly=same_hardware())
-    assert not lines, told(name, lines)
+    assert not lines, difference_report(name, lines)
 
 
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_the_same_flight_leaves_the_same_messages(name: str, tmp_path: Path) -> None:
     lines = flown_anew(read_log(path_of(name)), tmp_path, exactly=same_hardware())
-    assert not lines, told(name, lines)
+    assert not lines, difference_report(name, lines)
 
 
 @pytest.mark.parametrize("name", FLIGHTS)

@@ -14,9 +14,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from estimation.bounds.assumptions import Assumptions
 from estimation.bounds.error_bounds import Perceived, RateErrors, paper_h, sound_h
 from estimation.bounds.guarantees import alpha2_ultimate, guaranteed_rate
-from estimation.bounds.premises import Premises
 from formation.angles import FloatArray
 from formation.invariant_set import Disturbed, InvariantSet, invariant_set
 from formation.speed_range import SpeedRange
@@ -61,7 +61,7 @@ class Certificate:
 
 
 @lru_cache(maxsize=32)
-def certify(given: Premises) -> Certificate:
+def certify(given: Assumptions) -> Certificate:
     """Certificate of a pair and its leader; takes some tenths of a second, the first time."""
     velocity_error = given.velocity_error
     system = Disturbed(given.mu1, given.spacing, given.speeds, given.k_u)
@@ -80,7 +80,7 @@ def certify(given: Premises) -> Certificate:
     )
 
 
-def _sources(given: Premises) -> tuple[str, ...]:
+def _sources(given: Assumptions) -> tuple[str, ...]:
     return (
         f"noise: {given.noise}",
         f"v1 <= k_v = {given.k_v:g} m/s at constant speed and |u1| <= k_u = {given.k_u:g} rad/s, "
@@ -90,7 +90,7 @@ def _sources(given: Premises) -> tuple[str, ...]:
     )
 
 
-def _rates(given: Premises, velocity_error: float, held: InvariantSet | None) -> Claim:
+def _rates(given: Assumptions, velocity_error: float, held: InvariantSet | None) -> Claim:
     nearest, which = _nearest(given, held)
     figures = {
         "M_rho": velocity_error,
@@ -103,13 +103,13 @@ def _rates(given: Premises, velocity_error: float, held: InvariantSet | None) ->
     return Claim(figures, (*_sources(given), own, f"rho >= {nearest:.3g} m ({which})"))
 
 
-def _nearest(given: Premises, held: InvariantSet | None) -> tuple[float, str]:
+def _nearest(given: Assumptions, held: InvariantSet | None) -> tuple[float, str]:
     if held is None:
         return given.spacing.rho_0, "the desired distance, as no set is certified"
     return held.rho_min, "least distance of the certified formation"
 
 
-def _estimates(given: Premises, velocity_error: float) -> Claim:
+def _estimates(given: Assumptions, velocity_error: float) -> Claim:
     assumes = (*_sources(given), f"v1 >= v_eps = {given.v_eps:g} m/s")
     if given.v_eps <= velocity_error:
         why = (
@@ -120,7 +120,7 @@ def _estimates(given: Premises, velocity_error: float) -> Claim:
     return Claim({"M_v1": velocity_error, "M_alpha1": math.asin(velocity_error / given.v_eps)}, assumes)
 
 
-def _h(given: Premises, velocity_error: float, held: InvariantSet | None) -> Claim:
+def _h(given: Assumptions, velocity_error: float, held: InvariantSet | None) -> Claim:
     rho, alpha1 = _states(given, velocity_error, held)
     where = "rho_0 and alpha1 at its station" if held is None else "the certified formation"
     paper, sound = _h_bounds(given, velocity_error, rho, alpha1)
@@ -129,7 +129,7 @@ def _h(given: Premises, velocity_error: float, held: InvariantSet | None) -> Cla
 
 
 def _h_bounds(
-    given: Premises, velocity_error: float, rho: FloatArray, alpha1: FloatArray
+    given: Assumptions, velocity_error: float, rho: FloatArray, alpha1: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Bounds of h in the paper's and the sound form at believed states.
 
@@ -143,7 +143,7 @@ def _h_bounds(
 
 
 def _states(
-    given: Premises, velocity_error: float, held: InvariantSet | None
+    given: Assumptions, velocity_error: float, held: InvariantSet | None
 ) -> tuple[FloatArray, FloatArray]:
     """Distances and believed bearings of the certified set, or of the equilibrium without one."""
     wrong = math.asin(velocity_error / given.v_eps) if given.v_eps > velocity_error else math.pi
@@ -156,7 +156,7 @@ def _states(
     return np.broadcast_to(rho, alpha1.shape), alpha1
 
 
-def _alpha2_ultimate(given: Premises, M_alpha2: float) -> Claim:
+def _alpha2_ultimate(given: Assumptions, M_alpha2: float) -> Claim:
     assumes = (
         f"|alpha2_dot error| <= M_alpha2 = {M_alpha2:.3g} rad/s",
         "steering law (4), carried out at once",
@@ -170,7 +170,7 @@ def _alpha2_ultimate(given: Premises, M_alpha2: float) -> Claim:
     return Claim({"value": float(alpha2_ultimate(M_alpha2, given.mu2))}, assumes)
 
 
-def _formation(given: Premises, system: Disturbed, held: InvariantSet | None, besides: str) -> Claim:
+def _formation(given: Assumptions, system: Disturbed, held: InvariantSet | None, besides: str) -> Claim:
     speeds = system.speeds
     drives = (
         f"v1 = {speeds.lowest:g} m/s, constant"
@@ -188,7 +188,7 @@ def _formation(given: Premises, system: Disturbed, held: InvariantSet | None, be
     return Claim(figures, assumes)
 
 
-def _why_not_held(given: Premises, system: Disturbed) -> str:
+def _why_not_held(given: Assumptions, system: Disturbed) -> str:
     reach = given.spacing.mu_rho * system.speeds.lowest
     if reach <= system.D:
         return (
@@ -198,14 +198,14 @@ def _why_not_held(given: Premises, system: Disturbed) -> str:
     return f"the worst steering within {system.D:.3g} rad/s carries alpha1 past its saddle"
 
 
-def _formation_any_speed(given: Premises, system: Disturbed) -> Claim:
+def _formation_any_speed(given: Assumptions, system: Disturbed) -> Claim:
     any_speed = replace(system, speeds=SpeedRange(given.v_eps, given.k_v))
     held = None if given.unproved else invariant_set(any_speed)
     return _formation(given, any_speed, held, "exact estimates")
 
 
 def _formation_with_errors(
-    given: Premises, velocity_error: float, system: Disturbed, held: InvariantSet | None
+    given: Assumptions, velocity_error: float, system: Disturbed, held: InvariantSet | None
 ) -> Claim:
     """The set for D = k_u + the largest bound of h within it: enlarged until it holds for itself."""
     besides = "estimates as wrong as the sound bound of h allows"
@@ -222,7 +222,7 @@ def _formation_with_errors(
     return Claim({}, (besides,), "the set and the error of h within it keep enlarging each other")
 
 
-def _k_u_star(given: Premises) -> Claim:
+def _k_u_star(given: Assumptions) -> Claim:
     speeds = given.speeds
     assumes = ("exact estimates", MANIFOLD, f"v1 = {speeds.lowest:g} m/s, constant")
     if given.unproved:

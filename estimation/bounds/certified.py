@@ -24,7 +24,7 @@ _FEWEST_STEPS = 3.0
 
 
 class Failed(Enum):
-    """Which premise of a certificate is seen to fail; the value is the word for it on the wire.
+    """Which assumption of a certificate is seen to fail; the value is the word for it on the wire.
 
     GAP: too few measurements of late. UNSEEN: the newest measurement was not believed.
     NOISE: two positions are further apart than their errors and the leader's speed allow. SLOW: the leader is

@@ -1,8 +1,8 @@
 """What motion capture makes certain of a leader, frame by frame as they come.
 
-Rests on the premises that every position that was believed, of either robot, errs by no more than eps, that
-its capture time is right, and that the leader keeps to its speeds and accelerates by no more than A. Leaving
-out a frame makes the result weaker, never wrong.
+Rests on the assumptions that every position that was believed, of either robot, errs by no more than eps,
+that its capture time is right, and that the leader keeps to its speeds and accelerates by no more than A.
+Leaving out a frame makes the result weaker, never wrong.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from estimation.bounds.certified import Certain, Failed, Interval, certain_alpha1, certain_motion, window_ns
 from estimation.bounds.guarantees import guaranteed_window
-from estimation.bounds.recent import Recent, with_recent
+from estimation.bounds.sample_window import SampleWindow, with_measurement
 from formation.angles import FloatArray
 
 _NS = 1e-9
@@ -33,12 +33,12 @@ class PositionCertifier:
         self._window_ns = window_ns(float(guaranteed_window(eps, A)), step)
 
     def add(
-        self, known: Recent, capture_ns: int, leader: tuple[float, float], follower: tuple[float, float]
-    ) -> Recent:
+        self, known: SampleWindow, capture_ns: int, leader: tuple[float, float], follower: tuple[float, float]
+    ) -> SampleWindow:
         """What is known with one frame more: positions (x, y) [m] of both robots."""
-        return with_recent(known, capture_ns, (*leader, *follower), self._window_ns)
+        return with_measurement(known, capture_ns, (*leader, *follower), self._window_ns)
 
-    def certain(self, known: Recent, capture_ns: int) -> Certain | Failed:
+    def certain(self, known: SampleWindow, capture_ns: int) -> Certain | Failed:
         """What is certain at a capture time, which must be that of the newest frame."""
         if not known.ends_at(capture_ns):
             return Failed.UNSEEN
@@ -52,7 +52,7 @@ class PositionCertifier:
             motion.speed, certain_alpha1(motion.direction, self._line(known)), len(known.capture_ns)
         )
 
-    def _line(self, known: Recent) -> Interval:
+    def _line(self, known: SampleWindow) -> Interval:
         """Direction [rad] of the line from the leader to the follower."""
         leader_x, leader_y, follower_x, follower_y = known.values[-1].tolist()
         x, y = follower_x - leader_x, follower_y - leader_y

@@ -11,7 +11,7 @@ ago is wrong by M_v2 and points v M_u2 s aside. So the leader's velocity is cert
 at best 2 sqrt(e (A + v M_u2)) + M_v2 + rho M_u2: unlike positions in the world, better sightings alone do not
 bring it down to nothing.
 
-Rests on the premises that every sighting that was believed is within its bounds, that odometry, taken as
+Rests on the assumptions that every sighting that was believed is within its bounds, that odometry, taken as
 linear between its samples and held after the last, is within its own on the mean over the window, that
 capture times and stamps are right, and on the leader's limits.
 """
@@ -25,7 +25,7 @@ import numpy as np
 
 from estimation.bounds.certified import Certain, Failed, Interval, certain_alpha1, certain_motion, window_ns
 from estimation.bounds.guarantees import guaranteed_rate, guaranteed_window
-from estimation.bounds.recent import Recent, with_recent
+from estimation.bounds.sample_window import SampleWindow, with_measurement
 from estimation.own_motion.odometry_history import History
 from formation.angles import FloatArray, wrap
 
@@ -81,11 +81,11 @@ class SightingCertifier:
         self._window_ns = min(window_ns(best, step), round(LONGEST_WINDOW / _NS))
         self._delay_ns = round(delay / _NS)
 
-    def add(self, known: Recent, capture_ns: int, rho: float, alpha2: float) -> Recent:
+    def add(self, known: SampleWindow, capture_ns: int, rho: float, alpha2: float) -> SampleWindow:
         """What is known with one sighting more: range [m] and bearing [rad]."""
-        return with_recent(known, capture_ns, (rho, alpha2), self._window_ns)
+        return with_measurement(known, capture_ns, (rho, alpha2), self._window_ns)
 
-    def certain(self, known: Recent, odometry: History, capture_ns: int) -> Certain | Failed:
+    def certain(self, known: SampleWindow, odometry: History, capture_ns: int) -> Certain | Failed:
         """What is certain at a capture time, which must be that of the newest sighting."""
         if not known.ends_at(capture_ns):
             return Failed.UNSEEN

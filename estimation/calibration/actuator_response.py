@@ -69,7 +69,7 @@ def fit_response(
 
     Times (m,), (n,) [s] increase and have one zero. A grid of delays and lags finds where the median residual
     is least; from there on least squares with a soft l1 loss, each channel scaled by the spread of its
-    residuals, so that a saturated spell or a broken sample bends the fit little. The standard deviations are
+    residuals, so that a saturated part or a broken sample bends the fit little. The standard deviations are
     the larger ones of what independent errors leave and what the sums over blocks of a second or more show
     (Huber's sandwich), as rounding and slip make neighbours err alike. Unknown is what too little motion, or
     motion at an even speed, leaves uncertain by more than :data:`LARGEST_SD`, and what lies at an end of the
@@ -77,12 +77,12 @@ def fit_response(
     """
     if len(command_times) < 2 or len(times) < FEWEST:
         return None
-    told = commands[:, 0] + 1j * commands[:, 1]
-    chosen = _telling(command_times, told, times)
+    commanded = commands[:, 0] + 1j * commands[:, 1]
+    chosen = _telling(command_times, commanded, times)
     times, measured = times[chosen], measured[chosen]
     if len(times) < FEWEST or np.any(np.ptp(measured, axis=0) == 0.0):
         return None
-    answers = _Answers(command_times, told, times)
+    answers = _Answers(command_times, commanded, times)
     start, scales = _nearest(answers, measured)
     coarse = _Fit(answers, measured, scales)
     p = coarse.solved(np.array([*start, 1.0, 0.0, 1.0, 0.0]), EARLIEST)
@@ -94,18 +94,18 @@ def fit_response(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Answers:
-    """Answers to commands ``told`` at ``command_times``, as v + i u, at the times of the measurements."""
+    """Answers to what was ``commanded`` at ``command_times``, v + i u, at the times of the measurements."""
 
     command_times: Vector
-    told: NDArray[np.complex128]
+    commanded: NDArray[np.complex128]
     times: Vector
 
     def states(self, lag: float) -> NDArray[np.complex128]:
         """Answer without delay at the very time of every command."""
         kept = np.exp(-np.diff(self.command_times) / max(lag, _SHORTEST_LAG)).tolist()
-        steps = zip(self.told.tolist(), kept, strict=False)
+        steps = zip(self.commanded.tolist(), kept, strict=False)
         states = accumulate(
-            steps, lambda state, step: step[0] + (state - step[0]) * step[1], initial=self.told[0]
+            steps, lambda state, step: step[0] + (state - step[0]) * step[1], initial=self.commanded[0]
         )
         return np.array(list(states))
 
@@ -114,8 +114,8 @@ class _Answers:
         at = self.times - delay
         place = np.maximum(np.searchsorted(self.command_times, at, side="right") - 1, 0)
         since = np.maximum(at - self.command_times[place], 0.0)
-        left = (states[place] - self.told[place]) * np.exp(-since / max(lag, _SHORTEST_LAG))
-        answer = self.told[place] + left
+        left = (states[place] - self.commanded[place]) * np.exp(-since / max(lag, _SHORTEST_LAG))
+        answer = self.commanded[place] + left
         return np.column_stack([answer.real, answer.imag])
 
     def of(self, delay: float, lag: float) -> FloatArray:
@@ -208,10 +208,10 @@ class _Fit:
         return covariance if np.all(np.isfinite(covariance)) else None
 
 
-def _telling(command_times: Vector, told: NDArray[np.complex128], times: Vector) -> NDArray[np.bool_]:
+def _telling(command_times: Vector, commanded: NDArray[np.complex128], times: Vector) -> NDArray[np.bool_]:
     """Which times lie within the commands, and not long after the last one that was not to stand."""
     ends = np.append(command_times[1:], command_times[-1])
-    moving_until = np.maximum.accumulate(np.where(told != 0.0, ends, -np.inf))
+    moving_until = np.maximum.accumulate(np.where(commanded != 0.0, ends, -np.inf))
     place = np.maximum(np.searchsorted(command_times, times, side="right") - 1, 0)
     within = (times > command_times[0] + LATEST) & (times < command_times[-1])
     telling: NDArray[np.bool_] = within & (times < moving_until[place] + _STILL)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from estimation.filters.filter_states import Guess, Horizon, SensorOffsets, ShapeState
 from estimation.filters.gaussian import Gaussian, nis_of, started
-from estimation.filters.memory import Guess, Horizon, SensorOffsets, ShapeState
 from estimation.models import motion
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, Measurement
@@ -15,18 +15,18 @@ from estimation.models.motion import Matrix, Vector
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Modes:
-    """Memory of an estimator of several models: the belief of each, and the probability that it holds."""
+    """Filter state of an estimator of several models: the belief of each, and its probability to hold."""
 
     beliefs: tuple[Belief, ...]
     probabilities: tuple[float, ...]
 
 
 class Belief(NamedTuple):
-    """Mean (5,) and covariance (5, 5) of the same state, with ``memory`` for what they do not say."""
+    """Mean (5,) and covariance (5, 5) of the same state, with ``filter_state`` for what they do not say."""
 
     mean: Vector
     covariance: Matrix
-    memory: Modes | Guess | ShapeState | Horizon | SensorOffsets | None = None
+    filter_state: Modes | Guess | ShapeState | Horizon | SensorOffsets | None = None
 
     @property
     def gaussian(self) -> Gaussian:

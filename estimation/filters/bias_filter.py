@@ -27,7 +27,7 @@ import numpy as np
 
 from estimation.filters.belief import Belief, Model
 from estimation.filters.estimator import Estimator, MatrixStep
-from estimation.filters.memory import Excitation, SensorOffsets
+from estimation.filters.filter_states import Excitation, SensorOffsets
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import FrontEnd, Measurement
 from estimation.models.motion import STATE_SIZE, Matrix, Vector
@@ -41,8 +41,8 @@ _ROWS = STATE_SIZE + 2
 class BiasedExtended(Estimator):
     """EKF (5 + 2 states) for sightings; ``sd_range`` [m], ``sd_bearing`` [rad]: of the offsets beforehand.
 
-    The belief is that of the leader's states, the offsets travel in its memory. Raises :class:`ValueError`
-    for a model of the world front end, which has no such sensor.
+    The belief is that of the leader's states, the offsets travel in its filter state. Raises
+    :class:`ValueError` for a model of the world front end, which has no such sensor.
     """
 
     def __init__(self, model: Model, sd_range: float, sd_bearing: float) -> None:
@@ -54,13 +54,15 @@ class BiasedExtended(Estimator):
     def start(self, measurement: Measurement) -> Belief:
         """Belief from the first measurement alone, which knows the position up to the offsets."""
         base = self.model.start(measurement)
-        _, by_position, by_offset = _foreseen(base.mean, np.zeros(2))
+        _, by_position, by_offset = _predicted(base.mean, np.zeros(2))
         back = -np.linalg.solve(by_position, by_offset)
         covariance = base.covariance.copy()
         covariance[0:2, 0:2] += (back * self._prior) @ back.T
         cross = np.zeros((STATE_SIZE, 2))
         cross[0:2] = back * self._prior
-        return Belief(base.mean, covariance, memory=SensorOffsets(np.zeros(2), np.diag(self._prior), cross))
+        return Belief(
+            base.mean, covariance, filter_state=SensorOffsets(np.zeros(2), np.diag(self._prior), cross)
+        )
 
     def predict(self, belief: Belief, dt: float, follower: FollowerMotion) -> Belief:
         """Belief after dt [s], the follower having moved as given; the offsets stay."""
@@ -73,7 +75,7 @@ class BiasedExtended(Estimator):
             excitation=_aged(offsets.excitation, math.exp(-dt / _MEMORY)),
         )
         mean = model.propagate(belief.mean, dt, follower)
-        return Belief(mean, 0.5 * (covariance + covariance.T), memory=moved)
+        return Belief(mean, 0.5 * (covariance + covariance.T), filter_state=moved)
 
     def update(self, belief: Belief, measurement: Measurement) -> Belief:
         """Belief after a measurement (Joseph form); offsets that cannot be told get no gain."""
@@ -87,7 +89,7 @@ class BiasedExtended(Estimator):
 
     def _taken_in(self, belief: Belief, measurement: Measurement, gate: float) -> tuple[Belief, float]:
         offsets = offsets_of(belief)
-        seen, by_position, by_offset = _foreseen(belief.mean, offsets.mean)
+        seen, by_position, by_offset = _predicted(belief.mean, offsets.mean)
         joint = np.block([[belief.covariance, offsets.cross], [offsets.cross.T, offsets.covariance]])
         slope = np.zeros((2, _ROWS))
         slope[:, 0:2], slope[:, STATE_SIZE:] = by_position, by_offset
@@ -97,7 +99,9 @@ class BiasedExtended(Estimator):
         if not nis <= gate:
             return belief, nis
         gain = np.linalg.solve(spread, slope @ joint).T
-        gain[STATE_SIZE:][[not told for told in (offsets.range_told, offsets.bearing_told)]] = 0.0
+        gain[STATE_SIZE:][
+            [not observable for observable in (offsets.range_observable, offsets.bearing_observable)]
+        ] = 0.0
         mean = np.concatenate([belief.mean, offsets.mean]) + gain @ residual
         rest = np.eye(_ROWS) - gain @ slope
         after = rest @ joint @ rest.T + gain @ measurement.covariance @ gain.T
@@ -105,26 +109,26 @@ class BiasedExtended(Estimator):
         known = SensorOffsets(
             mean[STATE_SIZE:], after[STATE_SIZE:, STATE_SIZE:], after[:STATE_SIZE, STATE_SIZE:]
         )
-        updated = Belief(mean[:STATE_SIZE], after[:STATE_SIZE, :STATE_SIZE], memory=known)
+        updated = Belief(mean[:STATE_SIZE], after[:STATE_SIZE, :STATE_SIZE], filter_state=known)
         excited = _with_moment(offsets.excitation, updated, measurement.motion.v2)
         sure = _CLEAR * excited.sd_direction
         known = replace(
             known,
             excitation=excited,
-            range_told=excited.sight_spread > sure,
-            bearing_told=excited.own_spread > sure,
+            range_observable=excited.sight_spread > sure,
+            bearing_observable=excited.own_spread > sure,
         )
-        return updated._replace(memory=known), nis
+        return updated._replace(filter_state=known), nis
 
 
 def offsets_of(belief: Belief) -> SensorOffsets:
     """What a belief of :class:`BiasedExtended` knows of the sensor."""
-    if not isinstance(belief.memory, SensorOffsets):
-        raise TypeError(f"belief remembers {type(belief.memory).__name__}, expected SensorOffsets")
-    return belief.memory
+    if not isinstance(belief.filter_state, SensorOffsets):
+        raise TypeError(f"filter state is {type(belief.filter_state).__name__}, expected SensorOffsets")
+    return belief.filter_state
 
 
-def _foreseen(mean: Vector, offsets: Vector) -> tuple[Vector, Matrix, Matrix]:
+def _predicted(mean: Vector, offsets: Vector) -> tuple[Vector, Matrix, Matrix]:
     """Position (2,) that the sensor shows of the leader, its slopes (2, 2) by position and by the offsets."""
     x, y = mean[0:2].tolist()
     rho = max(math.hypot(x, y), 1e-6)
@@ -142,7 +146,7 @@ def _aged(excitation: Excitation, share: float) -> Excitation:
         share * excitation.sight,
         share * excitation.own,
         share * excitation.own_squared,
-        share * excitation.doubt,
+        share * excitation.direction_variance,
     )
 
 
@@ -164,5 +168,5 @@ def _with_moment(excitation: Excitation, belief: Belief, v2: float) -> Excitatio
         excitation.sight + sight,
         excitation.own + v2 * leader.conjugate(),
         excitation.own_squared + v2 * v2,
-        excitation.doubt + sd_heading**2,
+        excitation.direction_variance + sd_heading**2,
     )

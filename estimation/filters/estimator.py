@@ -110,7 +110,7 @@ class Interpreted:
 
 
 def whole_of(belief: Any) -> Belief:
-    """The belief in matrices behind a record, with its memory if it has one."""
+    """The belief in matrices behind a record, with its filter state if it has one."""
     if isinstance(belief, Remembering):
         return belief.whole
     return Belief(belief.mean, belief.covariance)

@@ -15,7 +15,7 @@ _ROWS, _COLUMNS = np.triu_indices(STATE_SIZE)
 
 
 class Rates(NamedTuple):
-    """Memory of an estimator that differences: last range, bearing, their smoothed rates, leader's heading.
+    """Filter state of one that differences: last range, bearing, their smoothed rates, leader's heading.
 
     ``samples``: differences so far, as a number that is divided by. ``elapsed`` [s]: since the last update.
     """

@@ -2,7 +2,7 @@
 
 Blom and Bar-Shalom, IEEE Trans. Automatic Control 33(8), 1988. The leader switches between the modes as a
 Markov chain in continuous time; before each prediction the filters exchange what they know, and after each
-measurement every mode is weighed by how well it had foreseen it.
+measurement every mode is weighed by how well it had predicted it.
 """
 
 from __future__ import annotations
@@ -57,12 +57,12 @@ class InteractingModels(Estimator):
         modes = _modes_of(belief)
         switch = self._switching(dt)
         shares = np.array(modes.probabilities)[:, None] * switch
-        foreseen = shares.sum(axis=0)
+        predicted = shares.sum(axis=0)
         moved = []
-        for each, column, total in zip(self._filters, shares.T, foreseen, strict=True):
+        for each, column, total in zip(self._filters, shares.T, predicted, strict=True):
             mixed = mixture(modes.beliefs, (column / total).tolist())
             moved.append(each.predict(Belief(mixed.mean, mixed.covariance), dt, follower))
-        return mixture(moved, foreseen.tolist())
+        return mixture(moved, predicted.tolist())
 
     def update(self, belief: Belief, measurement: Measurement) -> Belief:
         """Belief after a measurement: each mode takes it in and is weighed by its likelihood."""
@@ -95,13 +95,13 @@ def mixture(beliefs: Sequence[Belief], probabilities: Sequence[float]) -> Belief
     within = np.einsum("k,kij->ij", weights, np.stack([each.covariance for each in beliefs]))
     covariance = within + (apart.T * weights) @ apart
     modes = Modes(tuple(beliefs), tuple(probabilities))
-    return Belief(mean, 0.5 * (covariance + covariance.T), memory=modes)
+    return Belief(mean, 0.5 * (covariance + covariance.T), filter_state=modes)
 
 
 def _modes_of(belief: Belief) -> Modes:
-    if not isinstance(belief.memory, Modes):
-        raise TypeError(f"belief remembers {type(belief.memory).__name__}, expected Modes")
-    return belief.memory
+    if not isinstance(belief.filter_state, Modes):
+        raise TypeError(f"filter state is {type(belief.filter_state).__name__}, expected Modes")
+    return belief.filter_state
 
 
 def _log_likelihood(belief: Belief, measurement: Measurement) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 
 from estimation.filters.belief import Belief, Model
 from estimation.filters.estimator import Estimator
-from estimation.filters.memory import Horizon, Stage
+from estimation.filters.filter_states import Horizon, Stage
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import Measurement
 from estimation.models.motion import STATE_SIZE, Matrix, Vector
@@ -42,7 +42,7 @@ class MovingHorizon(Estimator):
         """Belief from the first measurement alone, which is the arrival cost of the first window."""
         base = self.model.start(measurement)
         stage = Stage(0.0, _AT_ONCE, _NO_DRIVE, base.mean)
-        return base._replace(memory=Horizon(base.mean, base.covariance, (stage,)))
+        return base._replace(filter_state=Horizon(base.mean, base.covariance, (stage,)))
 
     def predict(self, belief: Belief, dt: float, follower: FollowerMotion) -> Belief:
         """Belief after dt [s], the follower having moved as given."""
@@ -54,7 +54,7 @@ class MovingHorizon(Estimator):
         stage = Stage(dt, follower, drive, mean)
         horizon = _horizon_of(belief)
         grown = replace(horizon, stages=(*horizon.stages, stage))
-        return Belief(mean, 0.5 * (covariance + covariance.T), memory=grown)
+        return Belief(mean, 0.5 * (covariance + covariance.T), filter_state=grown)
 
     def update(self, belief: Belief, measurement: Measurement) -> Belief:
         """Belief after a measurement: the last state of the window fitted anew."""
@@ -68,24 +68,24 @@ class MovingHorizon(Estimator):
             horizon = replace(horizon, stages=tuple(moved))
         while len(horizon.stages) > self.window:
             horizon = self._without_oldest(horizon)
-        return Belief(horizon.stages[-1].state, covariance, memory=horizon)
+        return Belief(horizon.stages[-1].state, covariance, filter_state=horizon)
 
     def _solved(self, horizon: Horizon) -> tuple[list[Vector], Matrix]:
         """States of the window (n of (5,)) by one Gauss-Newton step, and the last one's covariance (5, 5)."""
         mean, covariance = _seen(horizon.stages[0], horizon.mean, horizon.covariance)
-        known, foreseen, spreads, shared = [mean], [], [], []
+        known, predicted, spreads, shared = [mean], [], [], []
         for before, stage in pairwise(horizon.stages):
             ahead, spread, cross = self._moved(before, stage, mean, covariance)
             mean, covariance = _seen(stage, ahead, spread)
             known.append(mean)
-            foreseen.append(ahead)
+            predicted.append(ahead)
             spreads.append(spread)
             shared.append(cross)
         states = [mean]
         if shared:
             gains = np.linalg.solve(np.stack(spreads), np.stack(shared)).transpose(0, 2, 1)
             for k in range(len(gains) - 1, -1, -1):
-                states.append(known[k] + gains[k] @ (states[-1] - foreseen[k]))
+                states.append(known[k] + gains[k] @ (states[-1] - predicted[k]))
         return states[::-1], covariance
 
     def _without_oldest(self, horizon: Horizon) -> Horizon:
@@ -118,6 +118,6 @@ def _seen(stage: Stage, mean: Vector, covariance: Matrix) -> tuple[Vector, Matri
 
 
 def _horizon_of(belief: Belief) -> Horizon:
-    if not isinstance(belief.memory, Horizon):
-        raise TypeError(f"belief remembers {type(belief.memory).__name__}, expected Horizon")
-    return belief.memory
+    if not isinstance(belief.filter_state, Horizon):
+        raise TypeError(f"filter state is {type(belief.filter_state).__name__}, expected Horizon")
+    return belief.filter_state

@@ -9,7 +9,7 @@ import numpy as np
 
 from estimation.filters.belief import Belief, Model
 from estimation.filters.estimator import Estimator
-from estimation.filters.memory import Guess, ShapeState
+from estimation.filters.filter_states import Guess, ShapeState
 from estimation.filters.shape_motion import cartesian, drive_through, range_and_bearing
 from estimation.models import motion
 from estimation.models.coordinated_turn import FollowerMotion
@@ -41,28 +41,30 @@ class ShapeFilter(Estimator):
     def start(self, measurement: Measurement) -> Belief:
         """Belief from the first measurement alone, the anchor of the first guess."""
         base = self.model.start(measurement)
-        return base._replace(memory=Guess(measurement.position, measurement.covariance))
+        return base._replace(filter_state=Guess(measurement.position, measurement.covariance))
 
     def predict(self, belief: Belief, dt: float, follower: FollowerMotion) -> Belief:
         """Belief after dt [s], the follower having moved as given."""
-        memory = belief.memory
-        if isinstance(memory, ShapeState):
-            state, covariance = drive_through(memory.state, memory.covariance, dt, follower, self.model)
-            pose = memory.pose
+        filter_state = belief.filter_state
+        if isinstance(filter_state, ShapeState):
+            state, covariance = drive_through(
+                filter_state.state, filter_state.covariance, dt, follower, self.model
+            )
+            pose = filter_state.pose
             if pose is not None:
                 pose = advance(pose, follower.v2, follower.u2, dt)
-            return _reported(replace(memory, state=state, covariance=covariance, pose=pose))
+            return _reported(replace(filter_state, state=state, covariance=covariance, pose=pose))
         model = self.model
         move = model.transition(belief.mean, dt, follower)
         covariance = move @ belief.covariance @ move.T + model.process_noise(belief.mean, dt, follower)
         mean = model.propagate(belief.mean, dt, follower)
         aged = _aged(_guess_of(belief), dt, follower, model.front_end)
-        return Belief(mean, 0.5 * (covariance + covariance.T), memory=aged)
+        return Belief(mean, 0.5 * (covariance + covariance.T), filter_state=aged)
 
     def update(self, belief: Belief, measurement: Measurement) -> Belief:
         """Belief after a measurement of the leader's position."""
-        if isinstance(belief.memory, ShapeState):
-            updated = _corrected(belief.memory, measurement)
+        if isinstance(belief.filter_state, ShapeState):
+            updated = _corrected(belief.filter_state, measurement)
             if updated.state[3] > 0.5 * self.model.limits.v_eps:
                 return _reported(updated)
             return self.start(measurement)
@@ -75,7 +77,7 @@ class ShapeFilter(Estimator):
         if known and guess.samples >= 3:
             return _reported(_shape_of_guess(found, measurement))
         if guess.elapsed > _OLDEST_ANCHOR:
-            return found._replace(memory=Guess(measurement.position, measurement.covariance))
+            return found._replace(filter_state=Guess(measurement.position, measurement.covariance))
         return found
 
     def _guessed(self, guess: Guess, measurement: Measurement) -> Belief:
@@ -89,13 +91,13 @@ class ShapeFilter(Estimator):
         covariance[2:4, 2:4] = limits.k_v**2 * (np.eye(2) - weight)
         covariance[2:4, 0:2] = weight @ measurement.covariance / age
         covariance[0:2, 2:4] = covariance[2:4, 0:2].T
-        return Belief(mean, 0.5 * (covariance + covariance.T), memory=guess)
+        return Belief(mean, 0.5 * (covariance + covariance.T), filter_state=guess)
 
 
 def _guess_of(belief: Belief) -> Guess:
-    if not isinstance(belief.memory, Guess):
-        raise TypeError(f"belief remembers {type(belief.memory).__name__}, expected Guess or ShapeState")
-    return belief.memory
+    if not isinstance(belief.filter_state, Guess):
+        raise TypeError(f"filter state is {type(belief.filter_state).__name__}, expected Guess or ShapeState")
+    return belief.filter_state
 
 
 def _aged(guess: Guess, dt: float, follower: FollowerMotion, front_end: FrontEnd) -> Guess:
@@ -131,44 +133,48 @@ def _shape_of_guess(found: Belief, measurement: Measurement) -> ShapeState:
     return _at(measurement, ShapeState(state, covariance))
 
 
-def _corrected(memory: ShapeState, measurement: Measurement) -> ShapeState:
+def _corrected(filter_state: ShapeState, measurement: Measurement) -> ShapeState:
     """EKF update by range and bearing (Joseph form); a speed below zero is one the other way."""
     seen, noise = range_and_bearing(measurement)
-    covariance = memory.covariance
+    covariance = filter_state.covariance
     gain = covariance @ _SEEN.T @ np.linalg.inv(_SEEN @ covariance @ _SEEN.T + noise)
-    residual = np.array([seen[0] - memory.state[0], wrap(float(seen[1] - memory.state[2]))])
-    rho, alpha1, alpha2, v1, u1 = (memory.state + gain @ residual).tolist()
+    residual = np.array([seen[0] - filter_state.state[0], wrap(float(seen[1] - filter_state.state[2]))])
+    rho, alpha1, alpha2, v1, u1 = (filter_state.state + gain @ residual).tolist()
     alpha1 = wrap(alpha1 + math.pi) if v1 < 0.0 else wrap(alpha1)
     rest = np.eye(5) - gain @ _SEEN
     updated = rest @ covariance @ rest.T + gain @ noise @ gain.T
     state = np.array([max(rho, 1e-6), alpha1, wrap(alpha2), abs(v1), u1])
-    return _at(measurement, replace(memory, state=state, covariance=0.5 * (updated + updated.T)))
+    return _at(measurement, replace(filter_state, state=state, covariance=0.5 * (updated + updated.T)))
 
 
-def _at(measurement: Measurement, memory: ShapeState) -> ShapeState:
+def _at(measurement: Measurement, filter_state: ShapeState) -> ShapeState:
     """State with the follower's pose as measured now."""
     noise = measurement.pose_noise
     if measurement.pose is None or noise is None:
-        return memory
-    return replace(memory, pose=measurement.pose, position_noise=noise.position, heading_noise=noise.heading)
+        return filter_state
+    return replace(
+        filter_state, pose=measurement.pose, position_noise=noise.position, heading_noise=noise.heading
+    )
 
 
-def _reported(memory: ShapeState) -> Belief:
+def _reported(filter_state: ShapeState) -> Belief:
     """Belief in the frame of the front end."""
-    mean, jacobian = cartesian(memory.state)
-    covariance: Matrix = jacobian @ memory.covariance @ jacobian.T
-    if memory.pose is not None:
-        mean, covariance = _in_world(mean, covariance, memory, memory.pose)
-    return Belief(mean, 0.5 * (covariance + covariance.T), memory=memory)
+    mean, jacobian = cartesian(filter_state.state)
+    covariance: Matrix = jacobian @ filter_state.covariance @ jacobian.T
+    if filter_state.pose is not None:
+        mean, covariance = _in_world(mean, covariance, filter_state, filter_state.pose)
+    return Belief(mean, 0.5 * (covariance + covariance.T), filter_state=filter_state)
 
 
-def _in_world(mean: Vector, covariance: Matrix, memory: ShapeState, pose: Pose) -> tuple[Vector, Matrix]:
+def _in_world(
+    mean: Vector, covariance: Matrix, filter_state: ShapeState, pose: Pose
+) -> tuple[Vector, Matrix]:
     cos_t, sin_t = math.cos(pose.theta), math.sin(pose.theta)
     rotation = np.eye(5)
     rotation[0:2, 0:2] = rotation[2:4, 2:4] = [[cos_t, -sin_t], [sin_t, cos_t]]
     px, py, wx, wy, _ = (turned := rotation @ mean).tolist()
-    by_heading = np.array([-py, px, -wy, wx, 0.0]) * memory.heading_noise
+    by_heading = np.array([-py, px, -wy, wx, 0.0]) * filter_state.heading_noise
     spread = rotation @ covariance @ rotation.T + np.outer(by_heading, by_heading)
-    spread[0, 0] += memory.position_noise**2
-    spread[1, 1] += memory.position_noise**2
+    spread[0, 0] += filter_state.position_noise**2
+    spread[1, 1] += filter_state.position_noise**2
     return turned + np.array([pose.x, pose.y, 0.0, 0.0, 0.0]), spread

@@ -77,9 +77,9 @@ def align_odometry(times: Vector, poses: Matrix, odometry_times: Vector, odometr
     likelihood = -0.5 * independent * np.log(np.maximum(rests, 1e-12)).sum(axis=1)
     best = int(np.argmax(likelihood))
     delay = _peak(delays, likelihood, best)
-    told = _mean_odometry(odometry_times, odometry, centres - (delay.value if delay else delays[best]))
-    scales, rest = _fit(seen, told)
-    power = np.mean(told**2, axis=0)
+    by_odometry = _mean_odometry(odometry_times, odometry, centres - (delay.value if delay else delays[best]))
+    scales, rest = _fit(seen, by_odometry)
+    power = np.mean(by_odometry**2, axis=0)
     sds = np.sqrt(rest / np.maximum(power, 1e-12) / independent)
     scale_v, scale_u = (
         Known(scale, sd) if sd < _LARGEST_SD_SCALE else None
@@ -88,10 +88,10 @@ def align_odometry(times: Vector, poses: Matrix, odometry_times: Vector, odometr
     return Alignment(delay, scale_v, scale_u)
 
 
-def _fit(seen: Matrix, told: Matrix) -> tuple[Vector, Vector]:
+def _fit(seen: Matrix, by_odometry: Matrix) -> tuple[Vector, Vector]:
     """Scales (2,) through the origin by least squares, and the mean squares (2,) of what they leave."""
-    scales = np.sum(told * seen, axis=0) / np.maximum(np.sum(told**2, axis=0), 1e-12)
-    return scales, np.mean((seen - scales * told) ** 2, axis=0)
+    scales = np.sum(by_odometry * seen, axis=0) / np.maximum(np.sum(by_odometry**2, axis=0), 1e-12)
+    return scales, np.mean((seen - scales * by_odometry) ** 2, axis=0)
 
 
 def _peak(delays: Vector, likelihood: Vector, best: int) -> Known | None:

@@ -20,15 +20,15 @@ SPAN_NS = 30_000_000_000
 EVERY_NS = 1_000_000_000
 """How often."""
 
-_THINNED_NS = 30_000_000  # between two poses or samples that are kept
+_DECIMATED_NS = 30_000_000  # between two poses or samples that are kept
 _SURE = 4.0  # standard deviations off the ideal, before a correction begins
 _LEAST_DELAY = 0.02  # [s]; below this nothing is worth correcting
 _LEAST_SCALE = 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class OdometryWatch:
-    """What alignment rests on, thinned: poses (capture_ns, pose) and samples of odometry.
+class OdometryComparison:
+    """What alignment rests on, decimated: poses (capture_ns, pose) and samples of odometry.
 
     ``found``: what it let know last; ``applied``: what odometry is corrected by.
     """
@@ -40,56 +40,56 @@ class OdometryWatch:
     next_ns: int = 0
 
 
-NOTHING_SEEN = OdometryWatch()
+NOTHING_SEEN = OdometryComparison()
 
 
-def with_pose(watch: OdometryWatch, capture_ns: int, pose: Pose) -> OdometryWatch:
-    """Watch with a mocap pose of the follower, if it is new and not too close to the one before."""
-    poses = watch.poses
-    if poses and capture_ns < poses[-1][0] + _THINNED_NS:
-        return watch
+def with_pose(comparison: OdometryComparison, capture_ns: int, pose: Pose) -> OdometryComparison:
+    """Comparison with a mocap pose of the follower, if it is new and not too close to the one before."""
+    poses = comparison.poses
+    if poses and capture_ns < poses[-1][0] + _DECIMATED_NS:
+        return comparison
     first = 0
     while first < len(poses) and poses[first][0] < capture_ns - SPAN_NS:
         first += 1
-    return replace(watch, poses=(*poses[first:], (capture_ns, pose)))
+    return replace(comparison, poses=(*poses[first:], (capture_ns, pose)))
 
 
-def with_sample(watch: OdometryWatch, sample: MotionSample) -> OdometryWatch:
-    """Watch with a sample of odometry, if it is new and not too close to the one before."""
-    samples = watch.samples
-    if samples and sample.stamp_ns < samples[-1].stamp_ns + _THINNED_NS:
-        return watch
+def with_sample(comparison: OdometryComparison, sample: MotionSample) -> OdometryComparison:
+    """Comparison with a sample of odometry, if it is new and not too close to the one before."""
+    samples = comparison.samples
+    if samples and sample.stamp_ns < samples[-1].stamp_ns + _DECIMATED_NS:
+        return comparison
     first = 0
     while first < len(samples) and samples[first].stamp_ns < sample.stamp_ns - SPAN_NS:
         first += 1
-    return replace(watch, samples=(*samples[first:], sample))
+    return replace(comparison, samples=(*samples[first:], sample))
 
 
-def reconsidered(watch: OdometryWatch, now_ns: int) -> OdometryWatch:
-    """Watch after a look at what it holds, once a second.
+def reconsidered(comparison: OdometryComparison, now_ns: int) -> OdometryComparison:
+    """Comparison after alignment of what it holds, once a second.
 
     A correction begins where the odometry is off by more than 20 ms or 2 % and by four standard deviations,
     and follows every later finding until that is within half of this; what is no longer known stays.
     """
-    if now_ns < watch.next_ns:
-        return watch
-    watch = replace(watch, next_ns=now_ns + EVERY_NS)
-    if len(watch.poses) < 2 or len(watch.samples) < 2:
-        return watch
-    zero_ns = watch.poses[0][0]
+    if now_ns < comparison.next_ns:
+        return comparison
+    comparison = replace(comparison, next_ns=now_ns + EVERY_NS)
+    if len(comparison.poses) < 2 or len(comparison.samples) < 2:
+        return comparison
+    zero_ns = comparison.poses[0][0]
     found = align_odometry(
-        np.array([(at_ns - zero_ns) * 1e-9 for at_ns, _ in watch.poses]),
-        np.array([(pose.x, pose.y, pose.theta) for _, pose in watch.poses]),
-        np.array([(sample.stamp_ns - zero_ns) * 1e-9 for sample in watch.samples]),
-        np.array([(sample.v2, sample.u2) for sample in watch.samples]),
+        np.array([(at_ns - zero_ns) * 1e-9 for at_ns, _ in comparison.poses]),
+        np.array([(pose.x, pose.y, pose.theta) for _, pose in comparison.poses]),
+        np.array([(sample.stamp_ns - zero_ns) * 1e-9 for sample in comparison.samples]),
+        np.array([(sample.v2, sample.u2) for sample in comparison.samples]),
     )
-    before = watch.applied
+    before = comparison.applied
     applied = Correction(
         _applied(found.delay, before.delay, 0.0, _LEAST_DELAY),
         _applied(found.scale_v, before.scale_v, 1.0, _LEAST_SCALE),
         _applied(found.scale_u, before.scale_u, 1.0, _LEAST_SCALE),
     )
-    return replace(watch, found=found, applied=applied)
+    return replace(comparison, found=found, applied=applied)
 
 
 def _applied(found: Known | None, before: float, ideal: float, least: float) -> float:

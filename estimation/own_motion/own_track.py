@@ -81,13 +81,13 @@ class OwnSpread(NamedTuple):
 class OwnPoint(NamedTuple):
     """The filter right after one pose.
 
-    ``odometry``: of the same moment, if it is ``told``. ``used_ns``: capture time of the newest pose that was
+    ``odometry``: of the same moment, if there is any. ``used_ns``: capture time of the newest pose that was
     used. ``rejected``: poses since then.
     """
 
     capture_ns: int
     pose: Pose
-    told: bool
+    has_odometry: bool
     odometry: FollowerMotion
     state: OwnState
     spread: OwnSpread
@@ -112,7 +112,9 @@ def motion_of(point: OwnPoint) -> FollowerMotion:
 
 
 @kernel
-def own_begun(capture_ns: int, pose: Pose, told: bool, odometry: FollowerMotion, noise: OwnNoise) -> OwnPoint:
+def own_begun(
+    capture_ns: int, pose: Pose, has_odometry: bool, odometry: FollowerMotion, noise: OwnNoise
+) -> OwnPoint:
     """Point of one who knows the pose only: at rest, give or take the limits."""
     place, heading = noise.pose.position * noise.pose.position, noise.pose.heading * noise.pose.heading
     speed, turn = noise.v_max * noise.v_max, noise.u_max * noise.u_max
@@ -120,7 +122,7 @@ def own_begun(capture_ns: int, pose: Pose, told: bool, odometry: FollowerMotion,
         place, 0.0, 0.0, 0.0, 0.0, place, 0.0, 0.0, 0.0, heading, 0.0, 0.0, speed, 0.0, turn
     )  # fmt: skip
     state = OwnState(pose.x, pose.y, pose.theta, 0.0, 0.0)
-    return OwnPoint(capture_ns, pose, told, odometry, state, spread, capture_ns, 0)
+    return OwnPoint(capture_ns, pose, has_odometry, odometry, state, spread, capture_ns, 0)
 
 
 @kernel(inline=False)
@@ -138,9 +140,9 @@ def own_followed(last: OwnPoint, due: OwnPoint, noise: OwnNoise) -> OwnPoint:
             return due._replace(state=due.state._replace(v=state.v, u=state.u))
     else:
         state, spread = found.state, found.spread
-    if due.told:
-        thinned = max(1.0, 2.0 * ODOMETRY_CORRELATION / dt)
-        by_odometry = _with_motion(state, spread, due.odometry, thinned)
+    if due.has_odometry:
+        inflation = max(1.0, 2.0 * ODOMETRY_CORRELATION / dt)
+        by_odometry = _with_motion(state, spread, due.odometry, inflation)
         if by_odometry.nis <= _MOTION_GATE:
             state, spread = by_odometry.state, by_odometry.spread
     return due._replace(state=state, spread=spread, used_ns=used_ns, rejected=rejected)
@@ -216,15 +218,18 @@ def _with_pose(state: OwnState, p: OwnSpread, pose: Pose, noise: PoseNoise) -> U
 
 
 @kernel
-def _with_motion(state: OwnState, p: OwnSpread, told: FollowerMotion, thinned: float) -> Updated:
+def _with_motion(state: OwnState, p: OwnSpread, odometry: FollowerMotion, inflation: float) -> Updated:
     """After odometry whose samples tell less than their number, by a factor on their variance."""
-    speed, turn = thinned * told.sd_v2 * told.sd_v2, thinned * told.sd_u2 * told.sd_u2
+    speed, turn = inflation * odometry.sd_v2 * odometry.sd_v2, inflation * odometry.sd_u2 * odometry.sd_u2
     first = _measured(
-        Updated(state, p, 0.0), OwnState(p.x_v, p.y_v, p.t_v, p.v_v, p.v_u), p.v_v + speed, told.v2 - state.v
+        Updated(state, p, 0.0),
+        OwnState(p.x_v, p.y_v, p.t_v, p.v_v, p.v_u),
+        p.v_v + speed,
+        odometry.v2 - state.v,
     )
     q = first.spread
     return _measured(
-        first, OwnState(q.x_u, q.y_u, q.t_u, q.v_u, q.u_u), q.u_u + turn, told.u2 - first.state.u
+        first, OwnState(q.x_u, q.y_u, q.t_u, q.v_u, q.u_u), q.u_u + turn, odometry.u2 - first.state.u
     )
 
 
@@ -284,7 +289,7 @@ def own_place(track: Rows[OwnPoint], ring: Ring, capture_ns: int) -> int:
 
 
 @kernel
-def foreseen(track: Rows[OwnPoint], ring: Ring, due: OwnPoint, noise: OwnNoise) -> OwnPoint:
+def own_predicted(track: Rows[OwnPoint], ring: Ring, due: OwnPoint, noise: OwnNoise) -> OwnPoint:
     """Point that the pose of ``due`` would become at its place, without putting it there.
 
     That of the track for a moment that it has; ``due`` itself for one from before it began.
@@ -329,6 +334,6 @@ def folded(track: Rows[OwnPoint], ring: Ring, due: OwnPoint, noise: OwnNoise, sp
 
 
 @kernel
-def retold(point: OwnPoint, odometry: FollowerMotion, noise: OwnNoise) -> OwnPoint:
+def own_reprocessed(point: OwnPoint, odometry: FollowerMotion, noise: OwnNoise) -> OwnPoint:
     """A point's pose, begun anew with the odometry that is now known of its moment."""
     return own_begun(point.capture_ns, point.pose, True, odometry, noise)

@@ -21,12 +21,12 @@ def steady_noise(
     moment is fused in if its noise is given.
     """
     speed, period_ns = 0.5 * noise.v_max, round(period / _NS)
-    told = odometry is not None
+    has_odometry = odometry is not None
     sample = FollowerMotion(speed, 0.0, odometry.sd_v2, odometry.sd_u2) if odometry else _NOTHING
-    point = own_begun(0, Pose(0.0, 0.0, 0.0), told, sample, noise)
+    point = own_begun(0, Pose(0.0, 0.0, 0.0), has_odometry, sample, noise)
     for k in range(1, max(2, math.ceil(_SETTLING / period))):
         pose = Pose(speed * k * period, 0.0, 0.0)
-        point = own_followed(point, own_begun(k * period_ns, pose, told, sample, noise), noise)
+        point = own_followed(point, own_begun(k * period_ns, pose, has_odometry, sample, noise), noise)
     motion = motion_of(point)
     return motion.sd_v2, motion.sd_u2
 

@@ -111,10 +111,10 @@ def predicted(
     """Line of the pair at ``until_ns``, from the sight at its capture time.
 
     The leader goes on with its estimated v1 and u1, and turns by ``further`` [rad], evenly on its way, beyond
-    that (:meth:`estimation.tracking.foresight.Foresight.further`). The follower starts with its measured v2,
-    u2 and follows the commands, given in order of time, through actuators of first-order ``lag`` [s]; before
-    the first of them it keeps its motion, after the last this one goes on. A sight of later, or one by which
-    both come to the same point, is given back as it is.
+    that (:meth:`estimation.tracking.turn_prediction.TurnPrediction.further`). The follower starts with its
+    measured v2, u2 and follows the commands, given in order of time, through actuators of first-order ``lag``
+    [s]; before the first of them it keeps its motion, after the last this one goes on. A sight of later, or
+    one by which both come to the same point, is given back as it is.
     """
     total = (until_ns - sight.capture_ns) * _NS
     if total <= 0.0:

@@ -62,8 +62,8 @@ def _carried_back(tracker: Tracker, here: TrackPoint, later: TrackPoint) -> Gaus
     follower = mean_motion(here.measurement.motion, later.measurement.motion)
     move = model.transition(filtered.mean, dt, follower)
     noise = model.process_noise(filtered.mean, dt, follower)
-    foreseen = move @ filtered.covariance @ move.T + noise
-    gain = np.linalg.solve(foreseen, move @ filtered.covariance).T
+    predicted = move @ filtered.covariance @ move.T + noise
+    gain = np.linalg.solve(predicted, move @ filtered.covariance).T
     change = later.belief.mean - model.propagate(filtered.mean, dt, follower)
     rest = np.eye(STATE_SIZE) - gain @ move
     covariance = rest @ filtered.covariance @ rest.T + gain @ (noise + later.belief.covariance) @ gain.T

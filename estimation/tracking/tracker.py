@@ -73,7 +73,7 @@ class TrackSettings(NamedTuple):
 
     gate_probability: share of good measurements that pass a chi-square gate.
     reacquire_frames: rejected measurements that must agree with each other before they take over.
-    coast_after, lost_after, window: [s]. doubt_for: how long [s] a jump stays uncertain.
+    coast_after, lost_after, window: [s]. jump_uncertain_for: how long [s] a jump stays uncertain.
     settled_heading, unsettled_heading: standard deviation of the leader's direction [rad] below which a track
     settles, and above which it no longer counts as settled.
     capped_speed: whether a leader that seems faster than k_v settles as one of k_v would.
@@ -85,7 +85,7 @@ class TrackSettings(NamedTuple):
     coast_after: float = 0.25
     lost_after: float = 1.0
     window: float = 0.2
-    doubt_for: float = 2.0
+    jump_uncertain_for: float = 2.0
     settled_heading: float = 0.35
     unsettled_heading: float = 0.6
     capped_speed: bool = True
@@ -250,7 +250,7 @@ def _taken_over(rejected: TrackPoint, settings: TrackSettings, estimator: Filter
 @kernel
 def _lasting(jump: JumpUncertainty, now_ns: int, settings: TrackSettings) -> JumpUncertainty:
     """Uncertainty as it is now: a body that has stayed where it jumped for long enough is there."""
-    if (now_ns - jump.since_ns) * _NS <= settings.doubt_for:
+    if (now_ns - jump.since_ns) * _NS <= settings.jump_uncertain_for:
         return jump
     return JumpUncertainty(0.0, 0.0, 0)
 

@@ -27,12 +27,12 @@ def command(scenario: str, overrides: tuple[str, ...], as_json: bool) -> None:
         print_json(certificate_json(certificate))
         return
     table = Table.grid(padding=(0, 2))
-    premises: dict[str, int] = {}
+    assumptions: dict[str, int] = {}
     for title, finding, assumes in certificate_lines(certificate):
-        marks = " ".join(f"[{premises.setdefault(text, len(premises) + 1)}]" for text in assumes)
+        marks = " ".join(f"[{assumptions.setdefault(text, len(assumptions) + 1)}]" for text in assumes)
         table.add_row(Text(title, style="bold"), Text.assemble(finding, (f"  {marks}", "dim")))
     console = Console(file=sys.stderr)
     console.print(table)
     console.print(Text("assuming"))
-    for text, number in premises.items():
+    for text, number in assumptions.items():
         console.print(Text(f"[{number}] {text}", style="dim"), soft_wrap=True)

@@ -85,8 +85,8 @@ def _say_timing(timing: Timing, scenario: Scenario) -> dict[str, object]:
     if timing.lateness is not None and timing.lateness.sd >= VAGUE:
         click.echo("the offset of stamps is too uncertain to be set: drive for 30 s", err=True)
     if settings:
-        told = " ".join(f"--set {key}={value:.4f}" for key, value in settings.items())
-        click.echo(f"run next with: {told}", err=True)
+        options = " ".join(f"--set {key}={value:.4f}" for key, value in settings.items())
+        click.echo(f"run next with: {options}", err=True)
         result["settings"] = settings
     return result
 

@@ -13,15 +13,15 @@ from hil.errors import CheckFailedError
 from hil.judge.chain_pairs import driven_trajectory
 from hil.judge.chain_summary import summarise_chain
 from hil.judge.chain_text import print_chain
-from hil.judge.evidence import Evidence, evidence_of_link
 from hil.judge.replay_verdict import (
     evaluated,
-    evidence_of_replay,
     parity_json,
     refuse_other_steps,
+    run_data_of_replay,
     violated_bounds,
     why_not_same,
 )
+from hil.judge.run_data import RunData, run_data_of_link
 from hil.log.metadata import scenario_of
 from hil.log.reader import Log
 from hil.log.report_json import print_json, write_json
@@ -46,13 +46,13 @@ class Wishes:
 
 def judge_run(log: Log, scenario: Scenario, folder: Path) -> dict[str, Any]:
     """Judge the log of a run, and leave summary and picture beside it."""
-    evidences = [evidence_of_link(log, link) for link in links_of(scenario)]
-    summary = summarise_chain(scenario, evidences)
-    _write(scenario, evidences, summary, folder, "run.png")
+    runs = [run_data_of_link(log, link) for link in links_of(scenario)]
+    summary = summarise_chain(scenario, runs)
+    _write(scenario, runs, summary, folder, "run.png")
     print_chain(summary)
     click.echo(
         f"a page is made of one follower at a time: abreast replay {log.path} "
-        f"--follower {evidences[-1].scenario.follower.name} --out DIR",
+        f"--follower {runs[-1].scenario.follower.name} --out DIR",
         err=True,
     )
     return summary
@@ -64,17 +64,17 @@ def replay_run(log: Log, chosen: Scenario, wishes: Wishes) -> None:
     if wishes.verify and own is not None:
         refuse_other_steps(chosen, own)
     played = replay_chain(log, chosen)
-    evidences = [evidence_of_replay(log, each, wishes.from_s, wishes.to_s) for each in played]
-    summary = summarise_chain(chosen, evidences)
+    runs = [run_data_of_replay(log, each, wishes.from_s, wishes.to_s) for each in played]
+    summary = summarise_chain(chosen, runs)
     if wishes.verify:
         summary["parity"] = parity_json(*played)
         for pair, each in zip(summary["pairs"], played, strict=True):
             pair["parity"] = parity_json(each)
     if wishes.out is not None:
-        _write(chosen, evidences, summary, made_folder(wishes.out), "replay.png")
-        for evidence in evidences:
-            name = evidence.scenario.follower.name
-            write_estimates(evaluated(evidence), wishes.out / f"estimates-{name}.csv")
+        _write(chosen, runs, summary, made_folder(wishes.out), "replay.png")
+        for run_data in runs:
+            name = run_data.scenario.follower.name
+            write_estimates(evaluated(run_data), wishes.out / f"estimates-{name}.csv")
     print_chain(summary)
     if wishes.as_json:
         print_json(summary)
@@ -86,10 +86,10 @@ def replay_run(log: Log, chosen: Scenario, wishes: Wishes) -> None:
 
 
 def _write(
-    scenario: Scenario, evidences: Sequence[Evidence], summary: dict[str, Any], folder: Path, picture: str
+    scenario: Scenario, runs: Sequence[RunData], summary: dict[str, Any], folder: Path, picture: str
 ) -> None:
     write_json(summary, folder / "summary.json")
-    trajectory = driven_trajectory(evidences)
+    trajectory = driven_trajectory(runs)
     if trajectory is None:
         click.echo("no picture: the log does not tell where the robots really were", err=True)
         return

@@ -14,11 +14,11 @@ from hil.scenario.files import load_scenario
 @click.option("--json", "as_json", is_flag=True, help="Print the proposal as one JSON object.")
 def command(scenario: str, overrides: tuple[str, ...], as_json: bool) -> None:
     """Propose gains for SCENARIO, and say for each what bounds it; or say why none work."""
-    from hil.simulate.gain_proposal import propose, told
+    from hil.simulate.gain_proposal import propose, report_lines
 
     proposal = propose(load_scenario(scenario, overrides))
     if as_json:
         print_json(proposal)
         return
-    for line in told(proposal):
+    for line in report_lines(proposal):
         click.echo(line, err=True)

@@ -15,7 +15,7 @@ from hil.reports.judged_log import leave, made_folder
 from hil.scenario.certify import CERTIFY, same_steps
 
 if TYPE_CHECKING:
-    from hil.judge.evidence import Evidence
+    from hil.judge.run_data import RunData
     from hil.log.reader import Log
     from hil.replay.rerun import Replay
     from hil.scenario.schema import Scenario
@@ -61,7 +61,7 @@ def command(
     --from and --to are seconds since the leader set off, for imported recordings the source's own time; the
     steps always begin where the log does.
     """
-    from hil.judge.replay_verdict import evidence_of_replay, parity_json, violated_bounds, why_not_same
+    from hil.judge.replay_verdict import parity_json, run_data_of_replay, violated_bounds, why_not_same
     from hil.judge.summary import summarise
     from hil.judge.summary_text import print_summary
     from hil.log.reader import read_log
@@ -78,13 +78,13 @@ def command(
         replay_run(given, chain, Wishes(verify, strict, as_json, from_s, to_s, out))
         return
     played = _played(given, chart, estimator, leader, follower, overrides, verify=verify)
-    evidence = evidence_of_replay(given, played, from_s, to_s)
-    summary = summarise(evidence)
+    run_data = run_data_of_replay(given, played, from_s, to_s)
+    summary = summarise(run_data)
     if chart is None and (own_motion := judge_own_motion(given, played.scenario)):
         summary["own_motion"] = own_motion
     if verify:
         summary["parity"] = parity_json(played)
-    _write(evidence, summary, table, out)
+    _write(run_data, summary, table, out)
     print_summary(summary)
     for name, what in (("commands", "commands to the robot"), ("certified", "certified estimates")):
         if name in played.parity and (unrecorded := played.parity[name].unrecorded):
@@ -175,13 +175,13 @@ def _refuse_leader(leader: str | None) -> None:
         )
 
 
-def _write(evidence: Evidence, summary: dict[str, Any], table: Path | None, out: Path | None) -> None:
+def _write(run_data: RunData, summary: dict[str, Any], table: Path | None, out: Path | None) -> None:
     from hil.judge.replay_verdict import evaluated
     from hil.replay.estimate_csv import write_estimates
 
     if table is not None:
-        write_estimates(evaluated(evidence), table)
+        write_estimates(evaluated(run_data), table)
     if out is None:
         return
-    write_estimates(evaluated(evidence), made_folder(out) / "estimates.csv")
-    leave(evidence, summary, out, "replay.png")
+    write_estimates(evaluated(run_data), made_folder(out) / "estimates.csv")
+    leave(run_data, summary, out, "replay.png")

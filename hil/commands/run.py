@@ -110,7 +110,7 @@ def _live(scenario: Scenario, folder: Path, log_path: Path, listen: str | None) 
 
     from hil.live.daemon import Ending
     from hil.live.run import run_live
-    from hil.live.watch import Picture
+    from hil.live.run_monitor import Snapshot
     from hil.wire.session import reserved_endpoint
 
     ending = Ending()
@@ -119,10 +119,10 @@ def _live(scenario: Scenario, folder: Path, log_path: Path, listen: str | None) 
     starting = console.status("starting router, emulator, estimator, controller and recorder")
     with nullcontext(listen) if listen else reserved_endpoint() as endpoint, starting as status:
 
-        def show(picture: Picture, elapsed: float | None) -> None:
+        def show(snapshot: Snapshot, elapsed: float | None) -> None:
             if elapsed is not None:
                 # What is on the wire may look like markup.
-                status.update(Text(picture.line(elapsed, scenario.run.duration_s)))
+                status.update(Text(snapshot.line(elapsed, scenario.run.duration_s)))
 
         try:
             outcome = run_live(scenario, folder, log_path, endpoint, ending, show)

@@ -46,7 +46,7 @@ def command(
         print_json(result)
         return
     for key, value in known(result).items():
-        click.echo(f"{key}: {_told(value)}", err=True)
+        click.echo(f"{key}: {_formatted(value)}", err=True)
     if out is not None:
         click.echo(f"pictures and trajectory.csv are in {out}", err=True)
 
@@ -72,19 +72,19 @@ def _simulate(scenario: Scenario, out: Path | None, *, stability: bool) -> dict[
     return simulate(scenario, out, stability=stability)
 
 
-def _told(value: Any) -> str:
+def _formatted(value: Any) -> str:
     """A result for who reads it: six digits, and of a long list its length and range."""
     match value:
         case dict():
             return ", ".join(
-                f"{key} ({_told(item)})" if isinstance(item, dict) else f"{key} {_told(item)}"
+                f"{key} ({_formatted(item)})" if isinstance(item, dict) else f"{key} {_formatted(item)}"
                 for key, item in value.items()
             )
         case [first, _, _, *_, last] if isinstance(first, float):
-            return f"{len(value)} from {_told(first)} to {_told(last)}"
+            return f"{len(value)} from {_formatted(first)} to {_formatted(last)}"
         case list():
             separator = "; " if any(isinstance(item, dict) for item in value) else " to "
-            return separator.join(map(_told, value))
+            return separator.join(map(_formatted, value))
         case bool():
             return "yes" if value else "no"
         case float():

@@ -25,7 +25,7 @@ from hil.wire.command_layout import write_truth
 from hil.wire.drive_layout import read_drive
 from hil.wire.frame_layout import write_frame_head
 from hil.wire.odometry_layout import write_odometry
-from hil.wire.records import Odometry as ToldOdometry
+from hil.wire.records import Odometry as OdometryNumbers
 from hil.wire.records import Placement, TruthNumbers, stamp_of
 
 
@@ -109,8 +109,10 @@ def tell_frame(
 @entry
 def tell_odometry(buffer: Buffer, numbers_at: int, stamp_ns: int, odometry: Rows[Odometry], k: int) -> None:
     """Fill :func:`hil.wire.templates.odometry_template` with what a robot says of itself in the k-th row."""
-    told = load(Odometry, borrowed(odometry), k)
-    message = ToldOdometry(True, stamp_of(stamp_ns), _placed(told.pose), told.motion.v, told.motion.u)
+    sample = load(Odometry, borrowed(odometry), k)
+    message = OdometryNumbers(
+        True, stamp_of(stamp_ns), _placed(sample.pose), sample.motion.v, sample.motion.u
+    )
     write_odometry(buffer, numbers_at, stamp_ns, message)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from formation.angles import FloatArray
-from hil.figures.shown import outside, with_gaps
+from hil.figures.plot_data import outside, with_gaps
 
 BELIEVED, LIMIT = "#2a8f4c", "#b03030"
 

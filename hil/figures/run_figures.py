@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
+from hil.figures.plot_data import PlotData
 from hil.figures.robot_drawing import draw_pair
 from hil.figures.run_panels import Panel, panels_for
-from hil.figures.shown import Shown
 from hil.judge.columns import inside
 
 DPI = 96
@@ -31,20 +31,20 @@ _COLOURS = 255
 _UNJUDGED = "#000000"
 
 
-def draw_run(shown: Shown, summary: Mapping[str, Any], path: Path) -> None:
+def draw_run(data: PlotData, summary: Mapping[str, Any], path: Path) -> None:
     """Write a PNG of a run or a replay; ``summary`` is what :func:`hil.judge.summary.summarise` says of it.
 
-    What the evidence does not hold is left out: without truth the tracks, without commands their panels.
+    What the run data does not hold is left out: without truth the tracks, without commands their panels.
     """
-    figure = _figure(shown)
+    figure = _figure(data)
     figure.suptitle(_title(summary), fontsize=11, y=1.0 - 0.1 / _HEIGHT)
     _save(figure, path)
 
 
-def _figure(shown: Shown) -> Figure:
+def _figure(data: PlotData) -> Figure:
     """Tracks over the latency to the left, then two stacks of panels; what there is."""
-    below, *stacks = panels_for(shown)
-    tracks = bool(np.any(np.isfinite(shown.columns.truth.rho)))
+    below, *stacks = panels_for(data)
+    tracks = bool(np.any(np.isfinite(data.columns.truth.rho)))
     if not tracks:
         stacks, below = [[*stacks[0], *below], stacks[1]], []
     widths = ([_TRACKS_WIDTH] if tracks else []) + [_STACK_WIDTH for stack in stacks if stack]
@@ -59,39 +59,39 @@ def _figure(shown: Shown) -> Figure:
         grid = figure.add_gridspec(
             1 + len(below), 1, height_ratios=_RATIOS[: 1 + len(below)], hspace=0.2, **across, **edges
         )
-        _draw_tracks(figure.add_subplot(grid[0]), shown)
-        _draw_stack([figure.add_subplot(grid[1 + row]) for row in range(len(below))], below, shown)
+        _draw_tracks(figure.add_subplot(grid[0]), data)
+        _draw_stack([figure.add_subplot(grid[1 + row]) for row in range(len(below))], below, data)
         left += _TRACKS_WIDTH + _BETWEEN
     for stack in filter(None, stacks):
         right = left + _STACK_WIDTH
         grid = figure.add_gridspec(
             len(stack), 1, left=left / width, right=right / width, hspace=0.12, **edges
         )
-        _draw_stack([figure.add_subplot(grid[row]) for row in range(len(stack))], stack, shown)
+        _draw_stack([figure.add_subplot(grid[row]) for row in range(len(stack))], stack, data)
         left = right + _BETWEEN
     return figure
 
 
-def _draw_tracks(axes: Axes, shown: Shown) -> None:
-    truth, run = shown.columns.truth, shown.columns.run
+def _draw_tracks(axes: Axes, data: PlotData) -> None:
+    truth, run = data.columns.truth, data.columns.run
     during = inside(truth.capture_ns, run)
     draw_pair(
         axes,
-        shown.seconds(truth.capture_ns[during]),
+        data.seconds(truth.capture_ns[during]),
         truth.leader[during],
         truth.follower[during],
     )
 
 
-def _draw_stack(rows: list[Axes], stack: list[Panel], shown: Shown) -> None:
+def _draw_stack(rows: list[Axes], stack: list[Panel], data: PlotData) -> None:
     """Panels below each other over the same time; shaded where the run is not judged."""
     if not stack:
         return
-    run, span = shown.columns.run, shown.columns.span
-    first, last = (float(shown.seconds(np.array([moment]))[0]) for moment in (run.from_ns, run.to_ns))
-    judged_from = float(shown.seconds(np.array([span.from_ns]))[0])
+    run, span = data.columns.run, data.columns.span
+    first, last = (float(data.seconds(np.array([moment]))[0]) for moment in (run.from_ns, run.to_ns))
+    judged_from = float(data.seconds(np.array([span.from_ns]))[0])
     for axes, panel in zip(rows, stack, strict=True):
-        panel(axes, shown)
+        panel(axes, data)
         axes.set_xlim(first, last)
         if judged_from > first:
             axes.axvspan(first, judged_from, color=_UNJUDGED, alpha=0.045, lw=0, zorder=0)

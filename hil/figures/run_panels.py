@@ -19,111 +19,109 @@ from hil.figures.panel_strokes import (
     limit_to,
     mark_violations,
 )
+from hil.figures.plot_data import PlotData, broken_at_jumps, with_gaps
 from hil.figures.robot_drawing import FOLLOWER
-from hil.figures.shown import Shown, broken_at_jumps, with_gaps
 
 TRUE, ORBIT = "#3c3c3c", "#7a5fa8"
 _FARTHEST = 4.0
 """A bound that is so many times out of the picture is left out: it would flatten the rest."""
 
 
-def draw_distance(axes: Axes, shown: Shown) -> None:
+def draw_distance(axes: Axes, data: PlotData) -> None:
     """Distance: true (estimated where the truth is not known), on the noise-free orbit, and desired."""
-    _draw_desired(axes, shown, 0, r"$\rho_0$")
-    _draw_shape(axes, shown, shown.columns.truth.rho, shown.tracked.seen.rho, 0)
+    _draw_desired(axes, data, 0, r"$\rho_0$")
+    _draw_shape(axes, data, data.columns.truth.rho, data.tracked.seen.rho, 0)
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel(r"$\rho$ [m]")
 
 
-def draw_alpha1(axes: Axes, shown: Shown) -> None:
+def draw_alpha1(axes: Axes, data: PlotData) -> None:
     """Bearing of the follower from the leader, as :func:`draw_distance`."""
-    _draw_desired(axes, shown, 1, "desired")
-    _draw_shape(axes, shown, shown.columns.truth.alpha1, shown.tracked.seen.alpha1, 1)
+    _draw_desired(axes, data, 1, "desired")
+    _draw_shape(axes, data, data.columns.truth.alpha1, data.tracked.seen.alpha1, 1)
     axes.set_ylabel(r"$\alpha_1$ [rad]")
 
 
-def draw_alpha2(axes: Axes, shown: Shown) -> None:
+def draw_alpha2(axes: Axes, data: PlotData) -> None:
     """Bearing of the leader from the follower, as :func:`draw_distance`."""
-    _draw_desired(axes, shown, 2, "desired")
-    _draw_shape(axes, shown, shown.columns.truth.alpha2, shown.tracked.seen.alpha2, 2)
+    _draw_desired(axes, data, 2, "desired")
+    _draw_shape(axes, data, data.columns.truth.alpha2, data.tracked.seen.alpha2, 2)
     axes.set_ylabel(r"$\alpha_2$ [rad]")
 
 
-def draw_v1(axes: Axes, shown: Shown) -> None:
+def draw_v1(axes: Axes, data: PlotData) -> None:
     """Leader's speed: estimate with three standard deviations, truth, and bound where it is judged."""
-    columns, seen = shown.columns, shown.tracked.seen
-    t, v1, sd = shown.seconds(shown.tracked.capture_ns), np.asarray(seen.v1), shown.tracked.sd[:, 2]
+    columns, seen = data.columns, data.tracked.seen
+    t, v1, sd = data.seconds(data.tracked.capture_ns), np.asarray(seen.v1), data.tracked.sd[:, 2]
     fill_band(axes, t, v1, 3.0 * sd)
     axes.plot(*with_gaps(t, v1), color=BELIEVED, lw=0.9, label="estimate")
     if np.any(np.isfinite(columns.truth.v1)):
-        axes.plot(
-            shown.seconds(columns.truth.capture_ns), columns.truth.v1, color=TRUE, lw=1.2, label="truth"
-        )
-    reach = max(shown.evidence.scenario.leader.k_v, float(np.median(v1)))
-    judged = shown.seconds(columns.samples.capture_ns)
-    if "v1" in shown.bounds:
-        bound, centre = shown.bounds["v1" + shown.drawn_bound], np.asarray(columns.samples.seen.v1)
+        axes.plot(data.seconds(columns.truth.capture_ns), columns.truth.v1, color=TRUE, lw=1.2, label="truth")
+    reach = max(data.run_data.scenario.leader.k_v, float(np.median(v1)))
+    judged = data.seconds(columns.samples.capture_ns)
+    if "v1" in data.bounds:
+        bound, centre = data.bounds["v1" + data.drawn_bound], np.asarray(columns.samples.seen.v1)
         if np.min(bound) < reach:
-            draw_bounds(axes, judged, centre - bound, centre + bound, shown.drawn_bound)
+            draw_bounds(axes, judged, centre - bound, centre + bound, data.drawn_bound)
         mark_violations(axes, judged, centre, np.abs(centre - columns.true.v1), bound)
     limit_to(axes, 0.0, 1.8 * reach)
     axes.set_ylabel("$v_1$ [m/s]")
 
 
-def draw_alpha1_error(axes: Axes, shown: Shown) -> None:
+def draw_alpha1_error(axes: Axes, data: PlotData) -> None:
     """Error of the leader's bearing: estimate minus truth, three standard deviations, and bound."""
-    columns = shown.columns
-    t, sd = shown.seconds(shown.tracked.capture_ns), shown.tracked.sd[:, QUANTITIES.index("alpha1")]
-    error = wrap(np.asarray(shown.tracked.seen.alpha1) - shown.tracked_true.alpha1)
+    columns = data.columns
+    t, sd = data.seconds(data.tracked.capture_ns), data.tracked.sd[:, QUANTITIES.index("alpha1")]
+    error = wrap(np.asarray(data.tracked.seen.alpha1) - data.tracked_true.alpha1)
     fill_band(axes, t, np.zeros(len(t)), 3.0 * sd)
     axes.plot(*with_gaps(t, error), color=BELIEVED, lw=0.9, label="error")
     reach = 4.0 * float(np.median(sd))
-    judged = shown.seconds(columns.samples.capture_ns)
-    if "alpha1" in shown.bounds:
-        bound = shown.bounds["alpha1" + shown.drawn_bound]
+    judged = data.seconds(columns.samples.capture_ns)
+    if "alpha1" in data.bounds:
+        bound = data.bounds["alpha1" + data.drawn_bound]
         at_samples = wrap(np.asarray(columns.samples.seen.alpha1) - columns.true.alpha1)
         largest = float(np.max(np.abs(at_samples), where=np.isfinite(at_samples), initial=0.0))
         reach = max(reach, 1.5 * largest)
         if np.max(bound) < _FARTHEST * reach:
             reach = max(reach, 1.15 * float(np.max(bound)))
-            draw_bounds(axes, judged, -bound, bound, shown.drawn_bound)
+            draw_bounds(axes, judged, -bound, bound, data.drawn_bound)
         mark_violations(axes, judged, at_samples, np.abs(at_samples), bound)
     axes.set_ylim(-min(reach, math.pi), min(reach, math.pi))
     axes.set_ylabel(r"$\hat\alpha_1 - \alpha_1$ [rad]")
 
 
-def draw_u1(axes: Axes, shown: Shown) -> None:
+def draw_u1(axes: Axes, data: PlotData) -> None:
     """Leader's turn rate: estimate with three standard deviations, and truth."""
-    t, u1, sd = shown.seconds(shown.tracked.capture_ns), shown.tracked.u1, shown.tracked.sd[:, 4]
+    t, u1, sd = data.seconds(data.tracked.capture_ns), data.tracked.u1, data.tracked.sd[:, 4]
     fill_band(axes, t, u1, 3.0 * sd)
     axes.plot(*with_gaps(t, u1), color=BELIEVED, lw=0.9, label="estimate")
-    truth = shown.columns.truth
+    truth = data.columns.truth
     if np.any(np.isfinite(truth.u1)):
-        axes.plot(shown.seconds(truth.capture_ns), truth.u1, color=TRUE, lw=1.2, label="truth")
-    reach = 2.0 * shown.evidence.scenario.leader.k_u
+        axes.plot(data.seconds(truth.capture_ns), truth.u1, color=TRUE, lw=1.2, label="truth")
+    reach = 2.0 * data.run_data.scenario.leader.k_u
     limit_to(axes, -reach, reach)
     axes.set_ylabel("$u_1$ [rad/s]")
 
 
-def draw_v2(axes: Axes, shown: Shown) -> None:
+def draw_v2(axes: Axes, data: PlotData) -> None:
     """Follower's speed as commanded, against its limit."""
-    _draw_command(axes, shown, shown.columns.commands.v2, shown.evidence.scenario.controller.v_max)
+    _draw_command(axes, data, data.columns.commands.v2, data.run_data.scenario.controller.v_max)
     axes.set_ylabel("$v_2$ [m/s]")
 
 
-def draw_u2(axes: Axes, shown: Shown) -> None:
+def draw_u2(axes: Axes, data: PlotData) -> None:
     """Follower's turn rate as commanded, against its limit."""
-    _draw_command(axes, shown, shown.columns.commands.u2, shown.evidence.scenario.controller.u_max)
+    _draw_command(axes, data, data.columns.commands.u2, data.run_data.scenario.controller.u_max)
     axes.set_ylabel("$u_2$ [rad/s]")
 
 
-def draw_latency(axes: Axes, shown: Shown) -> None:
+def draw_latency(axes: Axes, data: PlotData) -> None:
     """From every capture to the first command that rests on an estimate of it."""
-    commands = shown.columns.commands
+    commands = data.columns.commands
     first = commands.fresh
     waits_ms = (commands.issued_ns - commands.capture_ns)[first] * 1e-6
     axes.plot(
-        shown.seconds(commands.issued_ns[first]),
+        data.seconds(commands.issued_ns[first]),
         waits_ms,
         ls="none",
         marker=".",
@@ -136,21 +134,19 @@ def draw_latency(axes: Axes, shown: Shown) -> None:
     axes.set_ylabel("latency [ms]")
 
 
-Panel = Callable[[Axes, Shown], None]
+Panel = Callable[[Axes, PlotData], None]
 
 
-def panels_for(shown: Shown) -> tuple[list[Panel], list[Panel], list[Panel]]:
+def panels_for(data: PlotData) -> tuple[list[Panel], list[Panel], list[Panel]]:
     """Panels that have something to show: of the wire, of the shape, of the leader's motion and commands."""
-    columns, estimated = shown.columns, len(shown.tracked.capture_ns) > 0
+    columns, estimated = data.columns, len(data.tracked.capture_ns) > 0
     wire: list[Panel] = [draw_latency] if np.any(columns.commands.fresh) else []
     shape: list[Panel] = []
     motion: list[Panel] = []
     if estimated or np.any(np.isfinite(columns.truth.rho)):
         shape += [draw_distance, draw_alpha1, draw_alpha2]
     if estimated:
-        motion += (
-            [draw_v1, draw_alpha1_error] if np.any(np.isfinite(shown.tracked_true.alpha1)) else [draw_v1]
-        )
+        motion += [draw_v1, draw_alpha1_error] if np.any(np.isfinite(data.tracked_true.alpha1)) else [draw_v1]
     if len(columns.commands.issued_ns):
         motion += [draw_v2, draw_u2]
     if estimated:
@@ -158,32 +154,32 @@ def panels_for(shown: Shown) -> tuple[list[Panel], list[Panel], list[Panel]]:
     return wire, shape, motion
 
 
-def _draw_desired(axes: Axes, shown: Shown, column: int, label: str) -> None:
+def _draw_desired(axes: Axes, data: PlotData, column: int, label: str) -> None:
     """Where the formation wants a quantity; other labs' robots were not told."""
-    if shown.evidence.motion_since_ns is not None:
-        t, courses = shown.desired()
+    if data.run_data.motion_since_ns is not None:
+        t, courses = data.desired()
         axes.plot(t, courses[column], color=LIMIT, lw=1.0, ls=":", label=label)
 
 
-def _draw_shape(axes: Axes, shown: Shown, true: FloatArray, seen: Values, column: int) -> None:
+def _draw_shape(axes: Axes, data: PlotData, true: FloatArray, seen: Values, column: int) -> None:
     """True and noise-free course of a quantity; what was estimated where one of them is missing."""
-    moments = shown.columns.truth.capture_ns
+    moments = data.columns.truth.capture_ns
     known = bool(np.any(np.isfinite(true)))
-    if shown.orbit is not None:
-        wanted = moments[moments >= shown.orbit.from_ns]
-        ideal = with_gaps(shown.seconds(wanted), broken_at_jumps(shown.orbit.at(wanted)[column]))
+    if data.orbit is not None:
+        wanted = moments[moments >= data.orbit.from_ns]
+        ideal = with_gaps(data.seconds(wanted), broken_at_jumps(data.orbit.at(wanted)[column]))
         axes.plot(*ideal, color=ORBIT, lw=1.1, ls="--", label="noise-free", zorder=3)
     if known:
-        truth = with_gaps(shown.seconds(moments), broken_at_jumps(true))
+        truth = with_gaps(data.seconds(moments), broken_at_jumps(true))
         axes.plot(*truth, color=TRUE, lw=1.4, label="truth")
-    if shown.orbit is None or not known:
-        t = shown.seconds(shown.tracked.capture_ns)
+    if data.orbit is None or not known:
+        t = data.seconds(data.tracked.capture_ns)
         estimate = with_gaps(t, broken_at_jumps(np.asarray(seen)))
         axes.plot(*estimate, color=BELIEVED, lw=1.1, label="estimate")
 
 
-def _draw_command(axes: Axes, shown: Shown, sent: FloatArray, limit: float) -> None:
-    t = shown.seconds(shown.columns.commands.issued_ns)
+def _draw_command(axes: Axes, data: PlotData, sent: FloatArray, limit: float) -> None:
+    t = data.seconds(data.columns.commands.issued_ns)
     axes.plot(t, sent, color=FOLLOWER, lw=1.0, drawstyle="steps-post", label="command")
     low, high = min(float(np.min(sent)), 0.0), float(np.max(sent))
     # A limit far outside what is driven would only flatten the curve.

@@ -12,7 +12,7 @@ from estimation.bounds.error_bounds import InputErrors, RateErrors, Values
 from formation.angles import FloatArray, wrap
 from formation.spacing import Spacing
 from hil.judge.columns import Columns, EstimateColumns
-from hil.scenario.certificate import premises_of
+from hil.scenario.certificate import assumptions_of
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 from hil.wire.assumed_errors import AssumedErrors
@@ -127,7 +127,7 @@ def assumed_errors(scenario: Scenario, samples: EstimateColumns) -> dict[str, Va
     errors: dict[str, Values] = {
         name: np.array([getattr(each, name) for each in at_each]) for name in _ERRORS
     }
-    velocity = premises_of(scenario, driven=False).velocity_error
+    velocity = assumptions_of(scenario, driven=False).velocity_error
     return errors | {
         "M_rho": np.full(len(nearest), velocity + assumed.E_v2),
         "M_alpha2": velocity / np.array(nearest) + assumed.E_u2,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation.angles import FloatArray, wrap
-from hil.judge.evidence import Span
+from hil.judge.run_data import Span
 from hil.judge.true_states import Stamps, TrueStates
 from hil.wire.message_types import CertifiedEstimate
 from hil.wire.messages import to_ns
@@ -19,7 +19,7 @@ from hil.wire.messages import to_ns
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CertifiedColumns:
-    """Certified estimates as arrays of shape (n,); a radius is NaN where ``failed`` names a premise."""
+    """Certified estimates as arrays of shape (n,); a radius is NaN where ``failed`` names an assumption."""
 
     capture_ns: Stamps
     v1: FloatArray
@@ -48,9 +48,9 @@ class CertifiedColumns:
 def judge_certified(certified: Sequence[CertifiedEstimate], truth: TrueStates, span: Span) -> dict[str, Any]:
     """The ``certified`` part of a summary, of all certified estimates within a span; empty without any.
 
-    ``certified``: how many have radii; ``failed``: how many do not, by the premise that failed. Per quantity
-    v1 [m/s] and alpha1 [rad] the median and the largest radius; where the truth is known, how many errors
-    exceed theirs (none may) and the largest error / radius.
+    ``certified``: how many have radii; ``failed``: how many do not, by the assumption that failed. Per
+    quantity v1 [m/s] and alpha1 [rad] the median and the largest radius; where the truth is known, how many
+    errors exceed theirs (none may) and the largest error / radius.
     """
     columns = CertifiedColumns.of(certified, span)
     if not len(columns.capture_ns):
@@ -75,9 +75,9 @@ def certified_violations(summary: Mapping[str, Any]) -> dict[str, int]:
 def _verdict(radius: FloatArray, error: FloatArray) -> Mapping[str, float]:
     if not len(radius):
         return {}
-    told = {"median": float(np.median(radius)), "largest": float(np.max(radius))}
+    figures = {"median": float(np.median(radius)), "largest": float(np.max(radius))}
     judged = np.isfinite(error)
     if not np.any(judged):
-        return told
+        return figures
     ratio = error[judged] / np.maximum(radius[judged], 1e-12)
-    return told | {"violations": int(np.count_nonzero(ratio > 1.0)), "tightness": float(np.max(ratio))}
+    return figures | {"violations": int(np.count_nonzero(ratio > 1.0)), "tightness": float(np.max(ratio))}

@@ -11,7 +11,7 @@ import numpy as np
 from controllers.chain import ChainTrajectory
 from formation.angles import FloatArray
 from formation.station import Station
-from hil.judge.evidence import Evidence, run_span
+from hil.judge.run_data import RunData, run_span
 from hil.judge.true_states import TrueStates
 from hil.wire.messages import to_ns
 
@@ -70,24 +70,24 @@ def pair_figures(
     }
 
 
-def driven_trajectory(evidences: Sequence[Evidence]) -> ChainTrajectory | None:
-    """Trajectory of a chain that was driven, from the evidence of its pairs, the leader's first.
+def driven_trajectory(runs: Sequence[RunData]) -> ChainTrajectory | None:
+    """Trajectory of a chain that was driven, from the run data of its pairs, the leader's first.
 
     It runs from when the leader set off to the stop, at the moments at which the truth of all pairs is
     known; None where that is fewer than two. ``wanted`` is what the follower's newest command had asked for,
     where it was told to stand what it drove.
     """
-    span = run_span(evidences[0])
-    told = [TrueStates.of(evidence.truth) for evidence in evidences]
-    moments_ns = told[0].capture_ns
-    for each in told[1:]:
+    span = run_span(runs[0])
+    truths = [TrueStates.of(run_data.truth) for run_data in runs]
+    moments_ns = truths[0].capture_ns
+    for each in truths[1:]:
         moments_ns = np.intersect1d(moments_ns, each.capture_ns)
     moments_ns = moments_ns[(moments_ns >= span.from_ns) & (moments_ns <= span.to_ns)]
-    pairs = [each.at(moments_ns) for each in told]
+    pairs = [each.at(moments_ns) for each in truths]
     rho = np.column_stack([each.rho for each in pairs])
     if len(moments_ns) < 2 or not np.all(np.isfinite(rho)):
         return None
-    wanted = [_wanted(evidence, each) for evidence, each in zip(evidences, pairs, strict=True)]
+    wanted = [_wanted(run_data, each) for run_data, each in zip(runs, pairs, strict=True)]
     return ChainTrajectory(
         t=np.asarray((moments_ns - span.from_ns) * 1e-9, dtype=np.float64),
         rho=rho,
@@ -100,8 +100,8 @@ def driven_trajectory(evidences: Sequence[Evidence]) -> ChainTrajectory | None:
     )
 
 
-def _wanted(evidence: Evidence, states: TrueStates) -> FloatArray:
-    issued_ns = np.array([to_ns(command.header.stamp) for command in evidence.commands], dtype=np.int64)
-    asked = np.array([math.nan, *(command.v2_wanted for command in evidence.commands)])
+def _wanted(run_data: RunData, states: TrueStates) -> FloatArray:
+    issued_ns = np.array([to_ns(command.header.stamp) for command in run_data.commands], dtype=np.int64)
+    asked = np.array([math.nan, *(command.v2_wanted for command in run_data.commands)])
     newest = asked[np.searchsorted(issued_ns, states.capture_ns, side="right")]
     return np.where(np.isfinite(newest), newest, states.v2)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hil.judge.chain_pairs import DRIVEN, driven_trajectory, pair_figures, settling_times
-from hil.judge.evidence import Evidence
+from hil.judge.run_data import RunData
 from hil.judge.summary import summarise
 from hil.log.report_json import known
 from hil.scenario.parts import station
@@ -16,17 +16,17 @@ _OF_THE_CHAIN = ("seed", "mode", "estimator", "law", "duration_s", "clock", "log
 _ONLY_ONCE = ("scenario", *_OF_THE_CHAIN)
 
 
-def summarise_chain(scenario: Scenario, evidences: Sequence[Evidence]) -> dict[str, Any]:
-    """JSON of ``run`` and ``replay`` for a chain, from the evidence of its pairs, the leader's first.
+def summarise_chain(scenario: Scenario, runs: Sequence[RunData]) -> dict[str, Any]:
+    """JSON of ``run`` and ``replay`` for a chain, from the run data of its pairs, the leader's first.
 
     ``pairs``, one for each follower: ``leader``, ``follower``, the parts of
     :func:`hil.judge.summary.summarise` that are the pair's own and, where the truth is known, those of
     :func:`hil.judge.chain_pairs.pair_figures`, so that they stand beside ``abreast simulate``; settled is
     who keeps to :data:`hil.judge.chain_pairs.DRIVEN`. ``recovered``: whether all pairs have settled.
     """
-    summaries = [summarise(evidence) for evidence in evidences]
-    trajectory = driven_trajectory(evidences)
-    figures: list[dict[str, float | None]] = [{} for _ in evidences]
+    summaries = [summarise(run_data) for run_data in runs]
+    trajectory = driven_trajectory(runs)
+    figures: list[dict[str, float | None]] = [{} for _ in runs]
     recovered: bool | None = None
     if trajectory is not None:
         settled = settling_times(trajectory, scenario.formation.rho_0, station(scenario), DRIVEN)
@@ -36,12 +36,12 @@ def summarise_chain(scenario: Scenario, evidences: Sequence[Evidence]) -> dict[s
         ]
     pairs = [
         {
-            "leader": evidence.scenario.leader.name,
-            "follower": evidence.scenario.follower.name,
+            "leader": run_data.scenario.leader.name,
+            "follower": run_data.scenario.follower.name,
             **figure,
             **{name: part for name, part in summary.items() if name not in _ONLY_ONCE},
         }
-        for evidence, summary, figure in zip(evidences, summaries, figures, strict=True)
+        for run_data, summary, figure in zip(runs, summaries, figures, strict=True)
     ]
     whole = {name: summaries[0][name] for name in _OF_THE_CHAIN if name in summaries[0]}
     result: dict[str, Any] = known(

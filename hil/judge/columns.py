@@ -1,4 +1,4 @@
-"""Evidence as arrays, and the estimates that are judged beside their truth."""
+"""Run data as arrays, and the estimates that are judged beside their truth."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from estimation.bounds.error_bounds import Perceived
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
-from hil.judge.evidence import Evidence, Span, evaluation_span, run_span
+from hil.judge.run_data import RunData, Span, evaluation_span, run_span
 from hil.judge.true_states import Stamps, TrueStates
 from hil.wire.message_types import Command, LeaderEstimate
 from hil.wire.messages import to_ns
@@ -97,7 +97,7 @@ class CommandColumns:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
-    """Evidence as columns. ``samples``: the estimates that are judged; ``true``: the truth at each."""
+    """Run data as columns. ``samples``: the estimates that are judged; ``true``: the truth at each."""
 
     run: Span
     span: Span
@@ -108,17 +108,17 @@ class Columns:
     true: TrueStates
 
 
-def columns_of(evidence: Evidence) -> Columns:
-    """Columns of evidence. Samples are the estimates marked TRACKING whose capture lies in the evaluation."""
-    run, span = run_span(evidence), evaluation_span(evidence)
-    estimates, truth = EstimateColumns.of(evidence.estimates), TrueStates.of(evidence.truth)
+def columns_of(run_data: RunData) -> Columns:
+    """Columns of run data. Samples are the estimates marked TRACKING whose capture lies in the evaluation."""
+    run, span = run_span(run_data), evaluation_span(run_data)
+    estimates, truth = EstimateColumns.of(run_data.estimates), TrueStates.of(run_data.truth)
     judged = inside(estimates.capture_ns, span)
     samples = estimates.only(judged & (estimates.status == Status.TRACKING))
     return Columns(
         run=run,
         span=span,
         estimates=estimates,
-        commands=CommandColumns.of(evidence.commands),
+        commands=CommandColumns.of(run_data.commands),
         truth=truth,
         samples=samples,
         true=truth.at(samples.capture_ns),

@@ -15,7 +15,7 @@ from estimation.tracking.estimate import QUANTITIES
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray, wrap
 from hil.judge.columns import Columns, EstimateColumns, inside
-from hil.judge.evidence import Evidence, Span
+from hil.judge.run_data import RunData, Span
 from hil.judge.true_states import Stamps, TrueStates
 from hil.scenario.leader_model import leader_limits, pose_noise, process_noise
 from hil.scenario.schema import Scenario
@@ -29,7 +29,7 @@ EVERY = 8
 _SAME_NS = 2_000_000
 
 
-def judge_estimation(evidence: Evidence, columns: Columns) -> dict[str, object]:
+def judge_estimation(run_data: RunData, columns: Columns) -> dict[str, object]:
     """The ``estimation`` part of a summary.
 
     ``settle_s``: from the start of the run (the leader sets off, or the first capture) to the capture of the
@@ -44,14 +44,14 @@ def judge_estimation(evidence: Evidence, columns: Columns) -> dict[str, object]:
     errors = estimate_errors(columns)
     rmse = {name: _rms(error) for name, error in errors.items()}
     return {
-        "evaluated_from_s": (columns.span.from_ns - evidence.zero_ns) / 1e9,
+        "evaluated_from_s": (columns.span.from_ns - run_data.zero_ns) / 1e9,
         "samples": len(samples.capture_ns),
         "untracked": judged - len(samples.capture_ns),
         "settle_s": _settle(columns),
         "nis_mean": float(nis.mean()) if len(nis) else None,
         "rmse": rmse,
         "max": {name: float(np.nanmax(np.abs(error))) for name, error in errors.items()},
-        "efficiency": _efficiency(evidence, columns, rmse),
+        "efficiency": _efficiency(run_data, columns, rmse),
         "coverage_3sigma": _coverage(columns, errors),
     }
 
@@ -96,12 +96,12 @@ def _coverage(columns: Columns, errors: Mapping[str, FloatArray]) -> dict[str, f
     return shares
 
 
-def _efficiency(evidence: Evidence, columns: Columns, rmse: Mapping[str, float]) -> dict[str, float]:
-    given = evidence.scenario
-    emulated = evidence.motion_since_ns is not None
-    if evidence.frames is None or not rmse:
+def _efficiency(run_data: RunData, columns: Columns, rmse: Mapping[str, float]) -> dict[str, float]:
+    given = run_data.scenario
+    emulated = run_data.motion_since_ns is not None
+    if run_data.frames is None or not rmse:
         return {}
-    received = np.asarray(evidence.frames.captures_ns, dtype=np.int64)
+    received = np.asarray(run_data.frames.captures_ns, dtype=np.int64)
     bounds = least_deviations(given, columns, received, emulated=emulated)
     sizes = {name: bound[np.isfinite(bound)] for name, bound in bounds.items()}
     best = {name: _rms(bound) if len(bound) else 0.0 for name, bound in sizes.items()}

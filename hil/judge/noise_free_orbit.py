@@ -15,7 +15,7 @@ from formation.angles import FloatArray, wrap
 from formation.pose import Motion
 from formation.shape import Shape, shape_rates
 from formation.station import Side
-from hil.judge.evidence import Span
+from hil.judge.run_data import Span
 from hil.judge.side_orders import Order
 from hil.judge.true_states import Stamps, TrueStates
 from hil.scenario.parts import station_keeper

@@ -9,10 +9,10 @@ from typing import Any
 from hil import __version__
 from hil.errors import UsageError
 from hil.judge.certified import certified_violations
-from hil.judge.evidence import Evidence, evidence_of_link, evidence_of_log
+from hil.judge.run_data import RunData, run_data_of_link, run_data_of_log
 from hil.log.metadata import IMPORT, mode_of, version_of
 from hil.log.reader import Log
-from hil.replay.journal import Parity
+from hil.replay.re_execution import Parity
 from hil.replay.rerun import Replay
 from hil.scenario.certify import same_steps
 from hil.scenario.links import Link
@@ -33,21 +33,21 @@ def refuse_other_steps(chosen: Scenario, own: Scenario) -> None:
         )
 
 
-def evidence_of_replay(
+def run_data_of_replay(
     log: Log, played: Replay, from_s: float | None = None, to_s: float | None = None
-) -> Evidence:
-    """Evidence of a log with the estimates, commands and counts of its replay in place of the recorded ones.
+) -> RunData:
+    """Run data of a log with the estimates, commands and counts of its replay in place of the recorded ones.
 
     ``from_s``, ``to_s`` [s] limit the evaluation: in an imported log in the source's own time, else from when
     an emulated leader set off, else from the first capture. Raises :class:`UsageError` if they leave no
     estimate.
     """
-    found = _evidence(log, played.link)
+    found = _run_data(log, played.link)
     captures = [to_ns(estimate.header.stamp) for estimate in played.estimates]
     zero_ns = found.zero_ns
     if found.motion_since_ns is None and mode_of(log) != IMPORT:
         zero_ns = min(captures, default=zero_ns)
-    evidence = replace(
+    run_data = replace(
         found,
         mode="replay",
         estimates=played.estimates,
@@ -59,25 +59,25 @@ def evidence_of_replay(
         evaluate_from_ns=None if from_s is None else zero_ns + round(from_s * 1e9),
         evaluate_to_ns=None if to_s is None else zero_ns + round(to_s * 1e9),
     )
-    if captures and not evaluated(evidence):
+    if captures and not evaluated(run_data):
         first_s, last_s = ((at - zero_ns) * 1e-9 for at in (min(captures), max(captures)))
         raise UsageError(
             f"log {log.path}: no estimate between --from and --to; there are some from {first_s:.3f} s "
             f"to {last_s:.3f} s"
         )
-    return evidence
+    return run_data
 
 
-def _evidence(log: Log, link: Link) -> Evidence:
-    return evidence_of_link(log, link) if link.in_chain else evidence_of_log(log, link.scenario)
+def _run_data(log: Log, link: Link) -> RunData:
+    return run_data_of_link(log, link) if link.in_chain else run_data_of_log(log, link.scenario)
 
 
-def evaluated(evidence: Evidence) -> list[LeaderEstimate]:
+def evaluated(run_data: RunData) -> list[LeaderEstimate]:
     """Estimates within the limits that were asked for, both ends included; all if there are none."""
-    first, last = evidence.evaluate_from_ns, evidence.evaluate_to_ns
+    first, last = run_data.evaluate_from_ns, run_data.evaluate_to_ns
     return [
         estimate
-        for estimate in evidence.estimates
+        for estimate in run_data.estimates
         if (first is None or to_ns(estimate.header.stamp) >= first)
         and (last is None or to_ns(estimate.header.stamp) <= last)
     ]
@@ -117,8 +117,8 @@ def why_not_same(log: Log, played: Replay) -> str:
         # Whatever was consumed in the meantime, its receipts went by too.
         lost = lost or f"the log has nothing of {gap_s:.1f} s before: nobody can repeat what it misses"
     reasons = [reason for reason in (lost, _other_version(log)) if reason]
-    doubt = "did every daemon run with the recorder's scenario, and with this version of abreast?"
-    return f"log {log.path}: {', '.join(wrong)}; {'; '.join(reasons) or doubt}"
+    question = "did every daemon run with the recorder's scenario, and with this version of abreast?"
+    return f"log {log.path}: {', '.join(wrong)}; {'; '.join(reasons) or question}"
 
 
 def _other_version(log: Log) -> str:

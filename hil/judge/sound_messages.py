@@ -24,8 +24,8 @@ def is_sound(message: Message) -> bool:
             Status(message.status)
             return _can_be(message)
         if isinstance(message, CertifiedEstimate | Command | Truth):
-            told = [getattr(message, field.name) for field in fields(message)]
-            return not any(isinstance(each, float) and abs(each) > _LARGEST for each in told)
+            values = [getattr(message, field.name) for field in fields(message)]
+            return not any(isinstance(each, float) and abs(each) > _LARGEST for each in values)
     except (MalformedPayloadError, ValueError):
         return False
     return True

@@ -1,4 +1,4 @@
-"""The verdict on a run: from evidence to the JSON of ``run`` and ``replay``."""
+"""The verdict on a run: from run data to the JSON of ``run`` and ``replay``."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from hil.judge.certified import judge_certified
 from hil.judge.clock import judge_clock
 from hil.judge.columns import Columns, columns_of
 from hil.judge.estimation import judge_estimation
-from hil.judge.evidence import Evidence
 from hil.judge.formation import judge_formation
+from hil.judge.run_data import RunData
 from hil.log.report_json import known
 from hil.scenario.certificate import certificate_json, certificate_of
 from hil.scenario.ordered_sides import refusal
@@ -24,7 +24,7 @@ _STRANGERS = "unknown_body"
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "max": 100.0}
 
 
-def summarise(evidence: Evidence) -> dict[str, Any]:
+def summarise(run_data: RunData) -> dict[str, Any]:
     """JSON of ``run`` and ``replay`` without ``parity``; what cannot be known is absent.
 
     Estimates are judged where they say TRACKING, from ``estimation.evaluated_from_s`` to the stop or the end
@@ -35,42 +35,42 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
     ``orders_refused``: why the scenario's own orders to change sides were, if they were.
     ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it.
     """
-    columns = columns_of(evidence)
-    given = evidence.scenario
-    driven = evidence.motion_since_ns is not None
+    columns = columns_of(run_data)
+    given = run_data.scenario
+    driven = run_data.motion_since_ns is not None
     summary = {
         "scenario": given.name,
         "seed": given.run.seed if driven else None,
-        "mode": evidence.mode,
+        "mode": run_data.mode,
         "estimator": given.estimator.kind,
-        "law": given.controller.law if driven or evidence.commands else None,
+        "law": given.controller.law if driven or run_data.commands else None,
         "duration_s": columns.run.seconds,
-        "frames": _frames(evidence),
-        "estimation": judge_estimation(evidence, columns),
+        "frames": _frames(run_data),
+        "estimation": judge_estimation(run_data, columns),
         "bounds": judge_bounds(given, columns) | judge_assumptions(given, columns),
-        "certified": judge_certified(evidence.certified, columns.truth, columns.span),
-        "certificate": evidence.certificate or certificate_json(certificate_of(given, driven=driven)),
-        "formation": judge_formation(evidence, columns),
+        "certified": judge_certified(run_data.certified, columns.truth, columns.span),
+        "certificate": run_data.certificate or certificate_json(certificate_of(given, driven=driven)),
+        "formation": judge_formation(run_data, columns),
         "latency_ms": _latency(columns),
-        "clock": judge_clock(evidence.arrivals),
+        "clock": judge_clock(run_data.arrivals),
         "commands": _commands(columns),
         "orders_refused": refusal(given) if driven else None,
-        "rejected": dict(evidence.refused),
-        "log": None if evidence.log is None else asdict(evidence.log),
+        "rejected": dict(run_data.refused),
+        "log": None if run_data.log is None else asdict(run_data.log),
     }
     result: dict[str, Any] = known(summary)
     return result
 
 
-def _frames(evidence: Evidence) -> dict[str, int | None]:
-    frames, taken = evidence.frames, evidence.taken
+def _frames(run_data: RunData) -> dict[str, int | None]:
+    frames, taken = run_data.frames, run_data.taken
     return {
         "published": frames.published if frames else None,
         "received": frames.received if frames else taken.get("frames"),
         "used": taken.get("used"),
         "lost": frames.published - frames.received if frames else None,
         "late": taken.get("late", 0) if taken else None,
-        "rejected": sum(count for cause, count in evidence.refused.items() if cause != _STRANGERS),
+        "rejected": sum(count for cause, count in run_data.refused.items() if cause != _STRANGERS),
     }
 
 

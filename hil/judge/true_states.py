@@ -20,8 +20,8 @@ LONGEST_GAP_NS = 500_000_000
 Stamps = NDArray[np.int64]
 
 _POSES = ("leader_x", "leader_y", "leader_theta", "follower_x", "follower_y", "follower_theta")
-_TOLD = attrgetter(*_POSES, "v1", "u1", "v2", "u2")
-_TOLD_SIZE, _SHAPE_SIZE = 10, 5
+_RECORDED = attrgetter(*_POSES, "v1", "u1", "v2", "u2")
+_RECORDED_SIZE, _SHAPE_SIZE = 10, 5
 _HEADINGS = [2, 5]
 
 
@@ -48,15 +48,15 @@ class TrueStates:
     @staticmethod
     def of(truth: Sequence[Truth]) -> TrueStates:
         """Columns of messages in the order of their stamps; of several with one stamp the first counts."""
-        told = np.array(list(map(_TOLD, truth)), dtype=np.float64).reshape(-1, _TOLD_SIZE)
+        recorded = np.array(list(map(_RECORDED, truth)), dtype=np.float64).reshape(-1, _RECORDED_SIZE)
         stamps = np.array([to_ns(each.header.stamp) for each in truth], dtype=np.int64)
         moments_ns, first = np.unique(stamps, return_index=True)
-        return _states(moments_ns, _with_shape(told[first]))
+        return _states(moments_ns, _with_shape(recorded[first]))
 
     @staticmethod
-    def along(moments_ns: Stamps, told: FloatArray) -> TrueStates:
+    def along(moments_ns: Stamps, recorded: FloatArray) -> TrueStates:
         """Columns of increasing moments: rows (n, 10) of both poses, v1, u1, v2, u2."""
-        return _states(moments_ns, _with_shape(told))
+        return _states(moments_ns, _with_shape(recorded))
 
     def at(self, moments_ns: Stamps) -> TrueStates:
         """The truth at other moments: exact where there is one, else linear between its neighbours.
@@ -65,7 +65,7 @@ class TrueStates:
         than :data:`LONGEST_GAP_NS` apart.
         """
         known = self._rows()
-        rows = np.full((len(moments_ns), _TOLD_SIZE + _SHAPE_SIZE), math.nan)
+        rows = np.full((len(moments_ns), _RECORDED_SIZE + _SHAPE_SIZE), math.nan)
         if len(known):
             after = np.searchsorted(self.capture_ns, moments_ns)
             here, before = np.minimum(after, len(known) - 1), np.maximum(after - 1, 0)
@@ -74,7 +74,7 @@ class TrueStates:
             gap_ns = self.capture_ns[here] - self.capture_ns[before]
             between = ~exact & (after > 0) & (after < len(known)) & (gap_ns <= LONGEST_GAP_NS)
             share = (moments_ns - self.capture_ns[before])[between] / gap_ns[between]
-            first, second = known[before[between], :_TOLD_SIZE], known[here[between], :_TOLD_SIZE]
+            first, second = known[before[between], :_RECORDED_SIZE], known[here[between], :_RECORDED_SIZE]
             change = second - first
             change[:, _HEADINGS] = wrap(change[:, _HEADINGS])
             rows[between] = _with_shape(first + share[:, np.newaxis] * change)
@@ -90,13 +90,13 @@ def _states(moments_ns: Stamps, rows: FloatArray) -> TrueStates:
     return TrueStates(moments_ns, rows[:, 0:3], rows[:, 3:6], *rows[:, 6:].T)
 
 
-def _with_shape(told: FloatArray) -> FloatArray:
+def _with_shape(recorded: FloatArray) -> FloatArray:
     """Rows of both poses and both motions with the shape and its rates behind: Eqs. (2) and (3) of the paper.
 
     NaN where both robots are in one place: there is no shape.
     """
-    told[:, _HEADINGS] = wrap(told[:, _HEADINGS])
-    lx, ly, ltheta, fx, fy, ftheta, v1, _, v2, u2 = told.T
+    recorded[:, _HEADINGS] = wrap(recorded[:, _HEADINGS])
+    lx, ly, ltheta, fx, fy, ftheta, v1, _, v2, u2 = recorded.T
     dx, dy = fx - lx, fy - ly
     rho, line = np.hypot(dx, dy), np.arctan2(dy, dx)
     rho = np.where(rho > 0.0, rho, math.nan)
@@ -104,4 +104,4 @@ def _with_shape(told: FloatArray) -> FloatArray:
     alpha1, alpha2 = wrap(line - ltheta) + apart, wrap(line + math.pi - ftheta) + apart
     turning = (v1 * np.sin(alpha1) + v2 * np.sin(alpha2)) / rho
     rho_dot = -v1 * np.cos(alpha1) - v2 * np.cos(alpha2)
-    return np.column_stack([told, rho, alpha1, alpha2, rho_dot, turning - u2])
+    return np.column_stack([recorded, rho, alpha1, alpha2, rho_dot, turning - u2])

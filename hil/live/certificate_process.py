@@ -31,23 +31,23 @@ class CertificateProcess:
         if self._process.stdin is not None:
             self._process.stdin.write(scenario_text(scenario).encode())
             self._process.stdin.close()
-        self._told = False
+        self._done = False
 
     def result(self, timeout: float = 0.0) -> dict[str, dict[str, str]]:
         """Metadata record with the certificate if it is there within ``timeout`` [s], and was not before."""
-        if self._told:
+        if self._done:
             return {}
         try:
             code = self._process.wait(timeout)  # the answer is short: it fits into the pipe
         except subprocess.TimeoutExpired:
             return {}
-        self._told = True
+        self._done = True
         answer = self._process.stdout
         return certificate_metadata(json.loads(answer.read())) if code == 0 and answer else {}
 
     def close(self) -> None:
         """End the process; safe to call again."""
-        self._told = True
+        self._done = True
         self._process.kill()
         self._process.wait()
         if self._process.stdout is not None:

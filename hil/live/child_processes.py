@@ -20,7 +20,7 @@ class Child:
 
     name: str
     process: subprocess.Popen[bytes]
-    watch: int
+    exit_fd: int
     words: IO[bytes]
 
     @property
@@ -60,8 +60,8 @@ class Children:
 
     def wait_for_end_of_any(self, timeout: float) -> Child | None:
         """The first daemon found to have ended, or None after ``timeout`` [s]."""
-        readable, _, _ = select.select([child.watch for child in self._children.values()], [], [], timeout)
-        return next((child for child in self._children.values() if child.watch in readable), None)
+        readable, _, _ = select.select([child.exit_fd for child in self._children.values()], [], [], timeout)
+        return next((child for child in self._children.values() if child.exit_fd in readable), None)
 
     def end(self, names: list[str]) -> None:
         """Tell daemons to end, together, and wait; one that doesn't is killed."""
@@ -80,7 +80,7 @@ class Children:
         """End whatever still runs and let go of files and descriptors."""
         self.end(list(self._children))
         for child in self._children.values():
-            os.close(child.watch)
+            os.close(child.exit_fd)
             if child.process.stdin is not None:
                 child.process.stdin.close()
             child.words.close()

@@ -15,7 +15,7 @@ from formation.pose import STANDSTILL
 from hil.errors import UsageError
 from hil.live.child_processes import Children
 from hil.live.daemon import Ending
-from hil.live.watch import Picture, Watch
+from hil.live.run_monitor import RunMonitor, Snapshot
 from hil.scenario.files import scenario_text
 from hil.scenario.links import Link, links_of, node_names
 from hil.scenario.schema import Scenario
@@ -38,7 +38,7 @@ SILENCE = 3.0
 STANDSTILL_TIMEOUT = 10.0
 _GLANCE = 0.05
 
-Show = Callable[[Picture, float | None], None]
+Show = Callable[[Snapshot, float | None], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ def run_live(
     """Run a scenario live for its duration, or until the end is asked for, or until a daemon fails.
 
     The router listens on ``endpoint``, where others may connect too.
-    ``show`` gets the picture of the run and the time since the leader set off (None before), some 20 times a
+    ``show`` gets the snapshot of the run and the time since the leader set off (None before), some 20 times a
     second. However it ends, the robots are stopped, the log is finished and no process is left.
     """
     resolved = folder / "scenario.toml"
@@ -98,7 +98,7 @@ class _Supervisor:
         self._nodes = [name for daemon in DAEMONS for name in node_names(daemon, links)]
         self._session = open_session(Endpoints(connect=endpoint))
         self._wire = Wire(self._session, urgent_topics(scenario))
-        self._watch = Watch(self._session, self._pairs)
+        self._monitor = RunMonitor(self._session, self._pairs)
         self._children = Children(folder)
         extra = {
             "recorder": ["--out", str(log_path)],
@@ -119,17 +119,17 @@ class _Supervisor:
         duration = self._scenario.run.duration_s
         while not (ending.asked or failure):
             failure = self._failure(_GLANCE)
-            picture = self._watch.look()
+            snapshot = self._monitor.update()
             now = time.monotonic()
-            if set_off is None and picture.motion_since_ns is not None:
-                set_off = now - (time.time_ns() - picture.motion_since_ns) * 1e-9
-            if len(picture.heard) > known:
-                begun, known = now, len(picture.heard)
+            if set_off is None and snapshot.motion_since_ns is not None:
+                set_off = now - (time.time_ns() - snapshot.motion_since_ns) * 1e-9
+            if len(snapshot.heard) > known:
+                begun, known = now, len(snapshot.heard)
             if set_off is None and now - begun > START_TIMEOUT:
                 failure = (
-                    f"the start barrier did not open within {START_TIMEOUT:g} s: {self._waiting(picture)}"
+                    f"the start barrier did not open within {START_TIMEOUT:g} s: {self._waiting(snapshot)}"
                 )
-            show(picture, None if set_off is None else now - set_off)
+            show(snapshot, None if set_off is None else now - set_off)
             if set_off is not None and now - set_off >= duration:
                 break
         driven = 0.0 if set_off is None else min(time.monotonic() - set_off, duration)
@@ -142,7 +142,7 @@ class _Supervisor:
         self._children.end(self._names["emulator"])
         self._children.end(self._names["recorder"])
         self._children.close()
-        self._watch.close()
+        self._monitor.close()
         self._wire.close()
         close_session(self._session)
 
@@ -154,7 +154,7 @@ class _Supervisor:
             code = ended.process.wait()
             how = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
             return f"the {ended.name} {how}" + (f": {words}" if code > 0 and words else "")
-        silent = self._watch.picture.silent(self._nodes, SILENCE)
+        silent = self._monitor.snapshot.silent(self._nodes, SILENCE)
         return f"the {silent} has said nothing for {SILENCE:g} s" if silent else ""
 
     def _stop(self, reason: str) -> None:
@@ -170,13 +170,13 @@ class _Supervisor:
 
     def _somebody_moves(self) -> bool:
         """Whether a robot that was seen has yet to stand; without the emulator none ever will."""
-        picture = self._watch.look()
-        return bool(picture.truths) and not picture.standing and self._children.running("emulator")
+        snapshot = self._monitor.update()
+        return bool(snapshot.truths) and not snapshot.standing and self._children.running("emulator")
 
-    def _waiting(self, picture: Picture) -> str:
+    def _waiting(self, snapshot: Snapshot) -> str:
         """What the start barrier waits for, in words."""
-        unheard = [name for name in self._nodes if name not in picture.heard]
+        unheard = [name for name in self._nodes if name not in snapshot.heard]
         if unheard:
             return f"nothing was heard of {', '.join(unheard)}"
-        problems = [f"{name}: {problem}" for name, problem in picture.problems.items() if problem]
+        problems = [f"{name}: {problem}" for name, problem in snapshot.problems.items() if problem]
         return "; ".join(problems) or "no daemon says why"

@@ -8,7 +8,7 @@ from estimation.bounds.certified import Certain, Failed
 from estimation.bounds.certified_positions import PositionCertifier
 from estimation.bounds.certified_sightings import SightingCertifier, SightingErrors, velocity_error
 from estimation.bounds.guarantees import leader_acceleration
-from estimation.bounds.recent import NOTHING_RECENT, Recent
+from estimation.bounds.sample_window import EMPTY_WINDOW, SampleWindow
 from estimation.own_motion.odometry_history import History
 from formation.pose import Pose
 from hil.errors import UsageError
@@ -20,8 +20,8 @@ from hil.scenario.schema import Scenario
 class Believed:
     """Measurements of late that the estimator believed: frames and, on the body front end, sightings."""
 
-    frames: Recent = NOTHING_RECENT
-    sightings: Recent = NOTHING_RECENT
+    frames: SampleWindow = EMPTY_WINDOW
+    sightings: SampleWindow = EMPTY_WINDOW
 
 
 class Certifying:

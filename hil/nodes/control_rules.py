@@ -6,7 +6,7 @@ from controllers.follower import FollowerSettings
 from controllers.resolution import Resolution
 from hil.nodes.controller_step import ControlRules
 from hil.nodes.leader_turn import SOURCES
-from hil.scenario.parts import foresight, station_keeper
+from hil.scenario.parts import station_keeper, turn_prediction
 from hil.scenario.schema import Scenario
 
 _NS = 1e-9
@@ -19,7 +19,7 @@ def control_rules(scenario: Scenario) -> ControlRules:
     transport_ns = round(given.transport_s / _NS)
     return ControlRules(
         follower=FollowerSettings(station_keeper(scenario).settings, steps, given.max_age_s),
-        foresight=foresight(scenario),
+        turn_prediction=turn_prediction(scenario),
         turn_source=SOURCES[given.law].value,
         lag=given.lag_s,
         transport_ns=transport_ns,

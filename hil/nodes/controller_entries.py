@@ -79,7 +79,9 @@ def _noted(desk: Desk, digest: int, now_ns: int) -> None:
 
 
 @kernel
-def _written(desk: Desk, state: ControlState, told: Command, fresh: bool, stops: bytes, now_ns: int) -> int:
+def _written(
+    desk: Desk, state: ControlState, decided: Command, fresh: bool, stops: bytes, now_ns: int
+) -> int:
     """Write a decision and its drive command, with the state after it; the length of the former."""
     rules, notes = load(NodeRules, desk.rules, 0), load(Notes, desk.notes, 0)
     capture_ns, measured_ns = 0, 0
@@ -89,17 +91,17 @@ def _written(desk: Desk, state: ControlState, told: Command, fresh: bool, stops:
         now_ns,
         capture_ns,
         measured_ns,
-        told.reason,
+        decided.reason,
         notes.receipts,
-        told.v,
-        told.u,
-        told.v_wanted,
-        told.u_wanted,
-        told.saturated,
+        decided.v,
+        decided.u,
+        decided.v_wanted,
+        decided.u_wanted,
+        decided.saturated,
         fresh,
     )
     store(desk.notes, 0, Notes(0))
-    write_drive(desk.drive, rules.twist_at, now_ns, told.v, told.u)
+    write_drive(desk.drive, rules.twist_at, now_ns, decided.v, decided.u)
     return write_command(desk.decision, rules.times_at, stops, numbers, desk.receipts)
 
 

@@ -12,7 +12,6 @@ from controllers.follower import Command, FollowerSettings, FollowerState, Outlo
 from controllers.guard import CLOCK_TOLERANCE_NS, Standing
 from controllers.resolution import NO_REMAINDER
 from controllers.station_keeper import StationState, order_side
-from estimation.tracking.foresight import NO_TREND, Foresight, TurnTrend
 from estimation.tracking.prediction import (
     Reported,
     SentCommand,
@@ -23,6 +22,7 @@ from estimation.tracking.prediction import (
     with_command,
 )
 from estimation.tracking.tracker import Status
+from estimation.tracking.turn_prediction import NO_TREND, TurnPrediction, TurnTrend
 from formation.kernel import kernel
 from formation.line import Line
 from formation.pose import Motion
@@ -45,7 +45,7 @@ class ControlRules(NamedTuple):
     """
 
     follower: FollowerSettings
-    foresight: Foresight
+    turn_prediction: TurnPrediction
     turn_source: int
     lag: float
     transport_ns: int
@@ -136,7 +136,9 @@ def heard_estimate(
     if status != TRACKING:
         return state
     ahead = (now_ns + rules.ahead_ns - reported.capture_ns) * _NS
-    trend = trend_with(rules.foresight, state.trend, reported.capture_ns, reported.u1, reported.var_u1, ahead)
+    trend = trend_with(
+        rules.turn_prediction, state.trend, reported.capture_ns, reported.u1, reported.var_u1, ahead
+    )
     return state._replace(known=True, sight=sight_of(reported), trend=trend)
 
 
@@ -196,7 +198,7 @@ def outlook_at(state: ControlState, rules: ControlRules, commands: Rows[SentComm
     if not (state.known and sight.sound and age <= rules.follower.max_age):
         return Outlook(sight.line, Motion(0.0, 0.0), 0.0, False)
     ahead = (now_ns + rules.ahead_ns - sight.capture_ns) * _NS
-    further = turned_further(rules.turn_source, rules.foresight, trend, ahead)
-    u1 = turn_when_acting(rules.turn_source, rules.foresight, trend, state.leader_u1, ahead)
+    further = turned_further(rules.turn_source, rules.turn_prediction, trend, ahead)
+    u1 = turn_when_acting(rules.turn_source, rules.turn_prediction, trend, state.leader_u1, ahead)
     line = predicted(sight, commands, state.sent, now_ns + rules.ahead_ns, rules.lag, further)
     return Outlook(line, Motion(sight.v1, sight.u1), u1, True)

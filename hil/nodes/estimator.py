@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from estimation.own_motion.odometry_correction import (
     NOTHING_SEEN,
-    OdometryWatch,
+    OdometryComparison,
     reconsidered,
     with_pose,
     with_sample,
@@ -45,12 +45,12 @@ _UNUSED = (GATED, DUPLICATE, LATE)
 class EstimatorState:
     """All that the estimator remembers; it changes in place.
 
-    ``memory``: tracks, clock, receipts and counts, in rows. ``watch``: how odometry compares with mocap.
+    ``memory``: tracks, clock, receipts and counts, in rows. ``comparison``: how odometry compares with mocap.
     ``believed``: what certificates rest on, if any are asked for.
     """
 
     memory: EstimatorMemory
-    watch: OdometryWatch = NOTHING_SEEN
+    comparison: OdometryComparison = NOTHING_SEEN
     believed: Believed = field(default_factory=Believed)
     next_tick_ns: int = 0
     next_diagnostics_ns: int = 0
@@ -123,7 +123,7 @@ class EstimatorNode:
             return state, self._tick(state, now_ns)
         handler = self._handlers.get(event.topic)
         length = handler(state, event, now_ns) if handler is not None else 0
-        return state, self._told(state, length, now_ns) if length else ()
+        return state, self._messages(state, length, now_ns) if length else ()
 
     def _on_frame(self, state: EstimatorState, event: Event, now_ns: int) -> int:
         memory = state.memory
@@ -132,9 +132,9 @@ class EstimatorNode:
             return 0
         if self.aligns:
             frame = memory.frame
-            watch = reconsidered(with_pose(state.watch, frame.capture_ns, frame.seen.follower), now_ns)
-            memory.correct(watch.applied)
-            state.watch = watch
+            with_frame = with_pose(state.comparison, frame.capture_ns, frame.seen.follower)
+            state.comparison = reconsidered(with_frame, now_ns)
+            memory.correct(state.comparison.applied)
         length = memory.take_frame(now_ns)
         if self.certifying is not None and memory.notes.verdict not in _UNUSED:
             capture_ns, seen = memory.frame
@@ -159,7 +159,7 @@ class EstimatorNode:
         if came != SEEN and not self._is_seen(state, came):
             return 0
         if self.aligns:
-            state.watch = with_sample(state.watch, memory.sample)
+            state.comparison = with_sample(state.comparison, memory.sample)
         memory.take_odometry()
         return 0
 
@@ -168,24 +168,24 @@ class EstimatorNode:
         if came & (RESTARTED | SET_BACK):
             state.believed = Believed()
         if came & SET_BACK:
-            state.watch = NOTHING_SEEN
+            state.comparison = NOTHING_SEEN
         return bool(came & SEEN)
 
-    def _told(self, state: EstimatorState, length: int, now_ns: int) -> tuple[Outgoing, ...]:
+    def _messages(self, state: EstimatorState, length: int, now_ns: int) -> tuple[Outgoing, ...]:
         """An estimate whose message has a length, and what is certain of it if that is asked for."""
         payload, capture_ns = state.memory.message(length)
-        told = Outgoing(self.topics.estimate, _ESTIMATE, payload, capture_ns)
+        estimate = Outgoing(self.topics.estimate, _ESTIMATE, payload, capture_ns)
         if self.certifying is None:
-            return (told,)
-        estimate = load(Estimate, state.memory.desk.newest, 0)
+            return (estimate,)
+        newest = load(Estimate, state.memory.desk.newest, 0)
         certain = self.certifying.certain(state.believed, state.memory.history, capture_ns)
-        certified = certified_message(estimate, certain, now_ns, self.topics.follower)
-        return told, outgoing(self.topics.certified, certified, capture_ns)
+        certified = certified_message(newest, certain, now_ns, self.topics.follower)
+        return estimate, outgoing(self.topics.certified, certified, capture_ns)
 
     def _tick(self, state: EstimatorState, now_ns: int) -> tuple[Outgoing, ...]:
         """Speak up while measurements are missing, and report on the node itself."""
         length = state.memory.tick(now_ns)
-        out = self._told(state, length, now_ns) if length else ()
+        out = self._messages(state, length, now_ns) if length else ()
         if is_due(state.next_diagnostics_ns, _DIAGNOSTICS_NS, now_ns):
             out = (*out, self.report(state, now_ns))
             state.next_diagnostics_ns = now_ns + _DIAGNOSTICS_NS
@@ -205,6 +205,7 @@ class EstimatorNode:
             else {}
         )
         if self.aligns:
-            values |= {f"odometry.{name}": value for name, value in state.watch.applied._asdict().items()}
+            applied = state.comparison.applied._asdict()
+            values |= {f"odometry.{name}": value for name, value in applied.items()}
         values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)

@@ -58,14 +58,14 @@ class Notes(NamedTuple):
     """What a node remembers beside its tracks.
 
     ``receipts``: how many inputs have come since the last estimate. ``heard_ns``: when the newest one of all
-    came. ``told_ns``: when the last estimate went out. ``verdict``, ``cause``: what became of the newest
+    came. ``estimated_ns``: when the last estimate went out. ``verdict``, ``cause``: what became of the newest
     measurement, ``late`` whether it was captured before the newest.
     """
 
     times: HostTime
     receipts: int
     heard_ns: int
-    told_ns: int
+    estimated_ns: int
     verdict: int
     cause: int
     late: bool

@@ -38,11 +38,11 @@ from hil.nodes.refusals import (
     refusal_of,
 )
 from hil.nodes.status_reasons import reason_number
+from hil.wire.estimate_message import estimate_numbers, write_estimate_message
 from hil.wire.frame_layout import read_bodies
 from hil.wire.message_checks import check_frame, check_odometry, check_sighting
 from hil.wire.odometry_layout import read_odometry, read_sighting
 from hil.wire.records import Frame, FrameHead, Sighting, Wanted
-from hil.wire.told_estimate import told_numbers, write_told
 
 SEEN, RESTARTED, SET_BACK = 1, 2, 4
 """What comes of an input that is seen, added up: it can be used, the clock of the frames has jumped, this
@@ -79,9 +79,11 @@ def _estimated(desk: Desk, reasons: bytes, now_ns: int) -> int:
     estimate = newest.estimate
     store(desk.newest, 0, estimate)
     reason = reason_number(estimate.status, newest.cause)
-    numbers = told_numbers(estimate, rules.assumed, reason, notes.receipts, now_ns)
-    store(desk.notes, 0, notes._replace(receipts=0, told_ns=now_ns))
-    return write_told(desk.buffer, rules.times_at, reasons, numbers, estimate.joint, desk.receipts)
+    numbers = estimate_numbers(estimate, rules.assumed, reason, notes.receipts, now_ns)
+    store(desk.notes, 0, notes._replace(receipts=0, estimated_ns=now_ns))
+    return write_estimate_message(
+        desk.buffer, rules.times_at, reasons, numbers, estimate.joint, desk.receipts
+    )
 
 
 @kernel
@@ -212,7 +214,7 @@ def tick(desks: Rows[Desk], reasons: bytes, now_ns: int) -> int:
     settings = load(NodeRules, desk.rules, 0).step.settings
     found = status_of(newest_point(desk.points, known.track), now_ns, settings)
     missing = found in (COASTING, LOST)
-    due = (now_ns - load(Notes, desk.notes, 0).told_ns) * 2 > TICK_NS
+    due = (now_ns - load(Notes, desk.notes, 0).estimated_ns) * 2 > TICK_NS
     return _estimated(desk, reasons, now_ns) if missing and due else 0
 
 

@@ -31,13 +31,13 @@ from estimation.own_motion.own_track import (
     OwnNoise,
     OwnPoint,
     folded,
-    foreseen,
     motion_of,
     own_begun,
     own_followed,
     own_place,
     own_point,
-    retold,
+    own_predicted,
+    own_reprocessed,
 )
 from estimation.tracking.estimate import Estimate, estimate_at
 from estimation.tracking.follower_check import BELIEVED
@@ -135,7 +135,7 @@ def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen
         motion = by_odometry(known, memory, rules, capture_ns)
         return take(known, memory, rules, measured(rules, capture_ns, seen, motion))
     due = due_pose(known, memory, rules, capture_ns, seen)
-    motion = motion_of(foreseen(memory.own, known.own, due, rules.own_noise))
+    motion = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
     if known.own.length > 0 and capture_ns < own_point(memory.own, known.own, 0).capture_ns:
         motion = by_odometry(known, memory, rules, capture_ns)
     taken = take(known, memory, rules, measured(rules, capture_ns, seen, motion))
@@ -243,7 +243,7 @@ def _own_again(known: Known, memory: Memory, rules: Rules, since_ns: int) -> Non
     first = max(1, own_place(memory.own, ring, since_ns))
     for k in range(first, ring.length):
         due = own_point(memory.own, ring, k)
-        due = retold(due, by_odometry(known, memory, rules, due.capture_ns), noise)
+        due = own_reprocessed(due, by_odometry(known, memory, rules, due.capture_ns), noise)
         point = own_followed(own_point(memory.own, ring, k - 1), due, noise)
         store(memory.own, place(ring, memory.own, k), point)
 

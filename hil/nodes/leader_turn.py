@@ -1,72 +1,79 @@
-"""What a follower takes for the leader's steering: told by the leader, or foreseen from estimates."""
+"""What a follower takes for the leader's steering: told by the leader, or predicted from estimates."""
 
 from __future__ import annotations
 
 import math
 from enum import IntEnum
 
-from estimation.tracking.foresight import Foresight, TurnTrend
 from estimation.tracking.prediction import LARGEST
+from estimation.tracking.turn_prediction import TurnPrediction, TurnTrend
 from formation.kernel import kernel
 
 
 class TurnSource(IntEnum):
     """Where a law has the leader's turn rate from.
 
-    NOWHERE: it knows none. TOLD: what the leader is told to drive. FORESEEN: the estimate, carried on. FADED:
-    this as far as it is worth it.
+    NOWHERE: it knows none. TOLD: what the leader is told to drive. PREDICTED: the estimate, carried on.
+    FADED: this as far as it is worth it.
     """
 
     NOWHERE = 0
     TOLD = 1
-    FORESEEN = 2
+    PREDICTED = 2
     FADED = 3
 
 
 SOURCES = {
     "independent": TurnSource.NOWHERE,
     "ideal": TurnSource.TOLD,
-    "feedforward": TurnSource.FORESEEN,
+    "feedforward": TurnSource.PREDICTED,
     "faded": TurnSource.FADED,
 }
 """Sources by the law's name."""
 
-_FORESEEN, _FADED = TurnSource.FORESEEN.value, TurnSource.FADED.value
+_PREDICTED, _FADED = TurnSource.PREDICTED.value, TurnSource.FADED.value
 
 
 @kernel
 def trend_with(
-    foresight: Foresight, before: TurnTrend, capture_ns: int, u1: float, variance: float, ahead: float
+    turn_prediction: TurnPrediction,
+    before: TurnTrend,
+    capture_ns: int,
+    u1: float,
+    variance: float,
+    ahead: float,
 ) -> TurnTrend:
     """Trend with an estimate in it; one that no sound estimator gives ends it, not to stay in it.
 
     ``ahead`` [s] is from the estimate's capture to when a command acts.
     """
     if abs(u1) < LARGEST and 0.0 <= variance < LARGEST:
-        return foresight.heard(before, capture_ns, u1, variance, ahead)
+        return turn_prediction.heard(before, capture_ns, u1, variance, ahead)
     return TurnTrend(False, 0, 0.0, 0.0, 0.0)
 
 
 @kernel
-def turned_further(source: int, foresight: Foresight, trend: TurnTrend, ahead: float) -> float:
+def turned_further(source: int, turn_prediction: TurnPrediction, trend: TurnTrend, ahead: float) -> float:
     """Angle [rad] by which the leader will have turned further than its estimated u1 turns it.
 
     None without a trend, and none for the law that feeds u1 forward in full, whatever its noise: the slope
     would be in what it does twice.
     """
-    if source == _FORESEEN or not trend.known:
+    if source == _PREDICTED or not trend.known:
         return 0.0
-    return foresight.further(trend, ahead)
+    return turn_prediction.further(trend, ahead)
 
 
 @kernel
-def turn_when_acting(source: int, foresight: Foresight, trend: TurnTrend, told: float, ahead: float) -> float:
-    """Turn rate [rad/s] to give to the law: ``told`` for all laws that foresee none; nan without a trend."""
-    if source != _FORESEEN and source != _FADED:
-        return told
+def turn_when_acting(
+    source: int, turn_prediction: TurnPrediction, trend: TurnTrend, commanded: float, ahead: float
+) -> float:
+    """Turn rate [rad/s] to give to the law: ``commanded`` where none is predicted; nan without a trend."""
+    if source != _PREDICTED and source != _FADED:
+        return commanded
     if not trend.known:
         return math.nan
-    u1 = foresight.predicted(trend)
+    u1 = turn_prediction.predicted(trend)
     if source == _FADED:
-        return u1 * foresight.weight(trend.variance, ahead)
+        return u1 * turn_prediction.weight(trend.variance, ahead)
     return u1

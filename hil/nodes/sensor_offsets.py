@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 from estimation.filters.estimator import whole_of
+from estimation.filters.filter_states import SensorOffsets
 from estimation.filters.gaussian import Gaussian
-from estimation.filters.memory import SensorOffsets
 
 
 def offsets_report(belief: Gaussian) -> dict[str, object]:
     """Diagnostics of a filter with states for the sensor's offsets; empty for any other."""
-    known = whole_of(belief).memory
+    known = whole_of(belief).filter_state
     if not isinstance(known, SensorOffsets):
         return {}
     values = (*known.mean.tolist(), math.sqrt(known.covariance[0, 0]), math.sqrt(known.covariance[1, 1]))
@@ -19,6 +19,6 @@ def offsets_report(belief: Gaussian) -> dict[str, object]:
     report: dict[str, object] = {name: f"{value:.4f}" for name, value in zip(names, values, strict=True)}
     still = "off: the line of sight does not turn against the leader"
     steady = "off: the follower's velocity does not change against the leader's"
-    report["range_bias_state"] = "estimated" if known.range_told else still
-    report["bearing_bias_state"] = "estimated" if known.bearing_told else steady
+    report["range_bias_state"] = "estimated" if known.range_observable else still
+    report["bearing_bias_state"] = "estimated" if known.bearing_observable else steady
     return report

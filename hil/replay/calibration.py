@@ -84,8 +84,8 @@ def _poses(topic: str, payload: bytes, names: Topics, now_ns: int, late_ns: int)
         own = frame.follower
         return {frame.capture_ns - late_ns: (*frame.leader, own.x, own.y, own.theta)}
     truth = decode_as(payload, Truth)
-    told = (truth.leader_x, truth.leader_y, truth.follower_x, truth.follower_y, truth.follower_theta)
-    return {to_ns(truth.header.stamp): told} if all(map(math.isfinite, told)) else {}
+    positions = (truth.leader_x, truth.leader_y, truth.follower_x, truth.follower_y, truth.follower_theta)
+    return {to_ns(truth.header.stamp): positions} if all(map(math.isfinite, positions)) else {}
 
 
 def _true(poses: Poses, moments_ns: list[int], place: tuple[float, float]) -> FloatArray:

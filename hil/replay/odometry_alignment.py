@@ -58,12 +58,12 @@ def own_alignment(record: OwnRecord) -> Alignment:
     if not (record.poses and record.motions):
         return UNKNOWN
     zero_ns = min((*record.poses, *record.motions))
-    seen_ns, told_ns = sorted(record.poses), sorted(record.motions)
+    seen_ns, odometry_ns = sorted(record.poses), sorted(record.motions)
     return align_odometry(
         np.array([(at_ns - zero_ns) * 1e-9 for at_ns in seen_ns]),
         np.array([record.poses[at_ns] for at_ns in seen_ns]),
-        np.array([(at_ns - zero_ns) * 1e-9 for at_ns in told_ns]),
-        np.array([record.motions[at_ns] for at_ns in told_ns]),
+        np.array([(at_ns - zero_ns) * 1e-9 for at_ns in odometry_ns]),
+        np.array([record.motions[at_ns] for at_ns in odometry_ns]),
     )
 
 

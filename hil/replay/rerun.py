@@ -15,7 +15,15 @@ from hil.nodes.estimator import EstimatorNode, EstimatorState
 from hil.nodes.link_nodes import controller_node, estimator_node
 from hil.nodes.node import Outgoing
 from hil.replay.foreign_log import foreign_events
-from hil.replay.journal import Journey, Parity, feed, index_by_digest, parity_beside, parity_of, refeed
+from hil.replay.re_execution import (
+    Execution,
+    Parity,
+    execute,
+    index_by_digest,
+    parity_beside,
+    parity_of,
+    re_execute,
+)
 from hil.replay.smoothing import ListeningEstimator, smoothed_estimates
 from hil.replay.topic_map import TopicMap
 from hil.scenario.certify import same_steps
@@ -29,7 +37,7 @@ M = TypeVar("M", bound=msg.Message)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Replay:
-    """What came out of a replay of one follower's life.
+    """What came out of a replay of one follower.
 
     ``parity``: by ``estimates``, ``commands`` and, where the log has any, ``certified``, how they compare
     with the recorded ones; empty where the log was estimated anew. ``missing_inputs``: inputs that were
@@ -93,17 +101,17 @@ def replay_link(log: Log, chosen: Link, own: Link) -> Replay:
     recorded = recorded_estimates(log, node.topics.estimate)
     if not recorded:
         check_inputs(log, chosen.scenario)
-        return _estimated_anew(chosen, node, feed(node, logged_events(log, node.subscribes)))
+        return _estimated_anew(chosen, node, execute(node, logged_events(log, node.subscribes)))
     index = index_by_digest(logged_events(log, node.subscribes))
     same = same_steps(chosen.scenario, own.scenario)
-    journey = refeed(node, node.topics.estimate, recorded, index, same_node=same)
+    execution = re_execute(node, node.topics.estimate, recorded, index, same_node=same)
     if not same:
-        return _estimated_anew(chosen, node, journey)
-    parity = {"estimates": parity_of(journey.repeated, node.topics.estimate, {})}
+        return _estimated_anew(chosen, node, execution)
+    parity = {"estimates": parity_of(execution.repeated, node.topics.estimate, {})}
     if chosen.scenario.estimator.certify and own.scenario.estimator.certify:
         logged = [event.payload for event, _ in logged_events(log, [node.topics.certified])]
-        parity["certified"] = parity_beside(journey.outputs, node.topics.certified, logged)
-    return _with_commands(log, chosen, journey, parity)
+        parity["certified"] = parity_beside(execution.outputs, node.topics.certified, logged)
+    return _with_commands(log, chosen, execution, parity)
 
 
 def replay_foreign(log: Log, chart: TopicMap) -> Replay:
@@ -113,7 +121,7 @@ def replay_foreign(log: Log, chart: TopicMap) -> Replay:
     """
     link = Link(chart.scenario)
     node = _estimator_of(link)
-    return _estimated_anew(link, node, feed(node, foreign_events(log, chart)))
+    return _estimated_anew(link, node, execute(node, foreign_events(log, chart)))
 
 
 def _own_scenario(log: Log) -> Scenario:
@@ -132,39 +140,39 @@ def _estimator_of(link: Link) -> EstimatorNode:
     return estimator_node(link)
 
 
-def _estimated_anew(link: Link, node: EstimatorNode, journey: Journey[EstimatorState]) -> Replay:
+def _estimated_anew(link: Link, node: EstimatorNode, execution: Execution[EstimatorState]) -> Replay:
     if isinstance(node, ListeningEstimator):
         smoothed = smoothed_estimates(node)
         estimates, certified = smoothed.estimates, smoothed.certified
     else:
-        estimates = _decoded(journey.outputs, msg.LeaderEstimate)
-        certified = _decoded(journey.outputs, msg.CertifiedEstimate)
-    return Replay(link, estimates, (), journey.state, missing_inputs=journey.missing, certified=certified)
+        estimates = _decoded(execution.outputs, msg.LeaderEstimate)
+        certified = _decoded(execution.outputs, msg.CertifiedEstimate)
+    return Replay(link, estimates, (), execution.state, missing_inputs=execution.missing, certified=certified)
 
 
 def _with_commands(
-    log: Log, link: Link, estimator: Journey[EstimatorState], parity: Mapping[str, Parity]
+    log: Log, link: Link, estimator: Execution[EstimatorState], parity: Mapping[str, Parity]
 ) -> Replay:
-    """Repeat the controller's life too. It is fed with the estimates as logged, so it is judged by itself."""
+    """Execute the controller again too. It is fed with the estimates as logged, so it is judged by itself."""
     node = controller_node(link)
     recorded = recorded_commands(log, node.topics.command)
     index = index_by_digest(logged_events(log, node.subscribes))
-    journey = refeed(node, node.topics.command, recorded, index)
+    execution = re_execute(node, node.topics.command, recorded, index)
     drive = node.topics.cmd_vel
     sent = [event.payload for event, _ in logged_events(log, [drive])]
     return Replay(
         link=link,
         estimates=_decoded(estimator.outputs, msg.LeaderEstimate),
-        commands=_decoded(journey.outputs, msg.Command),
+        commands=_decoded(execution.outputs, msg.Command),
         estimator=estimator.state,
-        controller=journey.state,
+        controller=execution.state,
         parity={
             **parity,
-            "commands": parity_of(journey.repeated, node.topics.command, {drive: sent}),
+            "commands": parity_of(execution.repeated, node.topics.command, {drive: sent}),
         },
-        missing_inputs=estimator.missing + journey.missing,
+        missing_inputs=estimator.missing + execution.missing,
         certified=_decoded(estimator.outputs, msg.CertifiedEstimate),
-        restarts={"estimator": estimator.restarts, "controller": journey.restarts},
+        restarts={"estimator": estimator.restarts, "controller": execution.restarts},
     )
 
 

@@ -75,8 +75,8 @@ def smoothed_estimates(node: ListeningEstimator) -> Smoothed:
         status = tracker.status((point,), capture_ns)
         estimate = estimate_of(point.belief, measurement, status, point.nis, point.used_ns, NO_JUMP)
         reason = reason_number(status, Cause.NONE)
-        told = writer.write(row_of(estimate), reason, capture_ns, ())
-        estimates.append(decode_as(told, LeaderEstimate))
+        payload = writer.write(row_of(estimate), reason, capture_ns, ())
+        estimates.append(decode_as(payload, LeaderEstimate))
         if node.certifying is not None:
             certain = node.certain.get(capture_ns, Failed.UNSEEN)
             certified.append(certified_message(estimate, certain, capture_ns, frame_id))

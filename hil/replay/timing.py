@@ -180,10 +180,10 @@ def _response(commands: Motions, motions: Mapping[int, tuple[float, float]]) -> 
     if not (commands and motions):
         return None
     zero_ns = min(commands)
-    told_ns, seen_ns = sorted(commands), sorted(motions)
+    command_ns, seen_ns = sorted(commands), sorted(motions)
     return fit_response(
-        np.array([(at_ns - zero_ns) * 1e-9 for at_ns in told_ns]),
-        np.array([commands[at_ns] for at_ns in told_ns]),
+        np.array([(at_ns - zero_ns) * 1e-9 for at_ns in command_ns]),
+        np.array([commands[at_ns] for at_ns in command_ns]),
         np.array([(at_ns - zero_ns) * 1e-9 for at_ns in seen_ns]),
         np.array([motions[at_ns] for at_ns in seen_ns]),
     )

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from hil.figures.shown import Shown
+from hil.figures.plot_data import PlotData
 from hil.reports.plots import (
     BELIEVED,
     BOUND,
@@ -26,12 +26,12 @@ _LABELS = {"v1": "v₁", "alpha1": "α₁", "h": "h"}
 _COLOURS = {"v1": BELIEVED, "alpha1": PURPLE, "h": TRUE}
 
 
-def tightness_panel(shown: Shown, axis: TimeAxis) -> Panel | None:
+def tightness_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
     """Every error as a share of its extended bound [%]; None where no error is known."""
-    t = shown.seconds(shown.columns.samples.capture_ns)
+    t = data.seconds(data.columns.samples.capture_ns)
     used = {}
-    for name, error in shown.errors.items():
-        bound = shown.bounds[f"{name}_extended"]
+    for name, error in data.errors.items():
+        bound = data.bounds[f"{name}_extended"]
         share = np.divide(error, bound, out=np.full(len(t), math.nan), where=bound > 0.0)
         if np.any(np.isfinite(share)):
             used[name] = 100.0 * share

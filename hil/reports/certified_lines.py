@@ -5,28 +5,28 @@ from __future__ import annotations
 import numpy as np
 from bokeh.plotting import figure
 
-from hil.figures.shown import Shown
+from hil.figures.plot_data import PlotData
 from hil.reports.plots import PURPLE, Key, draw_line, table
 
 _CERTIFIED = ("v1", "alpha1")
 
 
-def largest_radius(shown: Shown, quantity: str) -> float | None:
+def largest_radius(data: PlotData, quantity: str) -> float | None:
     """Largest certified radius of a quantity; None where it has none."""
     if quantity not in _CERTIFIED:
         return None
-    radius = getattr(shown.certified, f"radius_{quantity}")
+    radius = getattr(data.certified, f"radius_{quantity}")
     known = radius[np.isfinite(radius)]
     return float(np.max(known)) if len(known) else None
 
 
-def draw_certified(plot: figure, shown: Shown, quantity: str, *, of_error: bool) -> Key:
+def draw_certified(plot: figure, data: PlotData, quantity: str, *, of_error: bool) -> Key:
     """Dashed lines at the radius to both sides of the estimate, or of zero in a plot of its error."""
-    columns = shown.certified
+    columns = data.certified
     radius = getattr(columns, f"radius_{quantity}")
     centre = np.zeros_like(radius) if of_error else getattr(columns, quantity)
     sides = {"low": centre - radius, "high": centre + radius}
-    source = table(shown.seconds(columns.capture_ns), radius, sides)
+    source = table(data.seconds(columns.capture_ns), radius, sides)
     for side in sides:
         draw_line(plot, source, side, PURPLE, dash="dashed", width=1.0)
     return Key("certified", PURPLE, "dashed")

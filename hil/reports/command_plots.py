@@ -10,8 +10,9 @@ from bokeh.models.glyphs import Quad
 from bokeh.plotting import figure
 
 from formation.angles import FloatArray
-from hil.figures.shown import LONGEST_LINE, Shown
+from hil.figures.plot_data import LONGEST_LINE, PlotData
 from hil.judge.columns import inside
+from hil.reports.intervals import TimeInterval, intervals_of
 from hil.reports.plots import (
     FOLLOWER,
     GREY,
@@ -26,25 +27,24 @@ from hil.reports.plots import (
     limits_around,
     table,
 )
-from hil.reports.spells import Spell, spells_of
 
 
-def stops_of(shown: Shown) -> list[Spell]:
-    """Spells over which the robot was told to stand still, by reason, while the run lasted."""
-    issued_ns = shown.columns.commands.issued_ns
-    during = inside(issued_ns, shown.columns.run) & (issued_ns < shown.columns.run.to_ns)
-    reasons = [each.stop for each, counts in zip(shown.evidence.commands, during, strict=True) if counts]
-    spells = spells_of(shown.seconds(issued_ns[during]), reasons, LONGEST_LINE)
-    return [spell for spell in spells if spell.what]
+def stops_of(data: PlotData) -> list[TimeInterval]:
+    """Intervals over which the robot was told to stand still, by reason, while the run lasted."""
+    issued_ns = data.columns.commands.issued_ns
+    during = inside(issued_ns, data.columns.run) & (issued_ns < data.columns.run.to_ns)
+    reasons = [each.stop for each, counts in zip(data.run_data.commands, during, strict=True) if counts]
+    intervals = intervals_of(data.seconds(issued_ns[during]), reasons, LONGEST_LINE)
+    return [interval for interval in intervals if interval.what]
 
 
-def command_panels(shown: Shown, axis: TimeAxis) -> list[Panel]:
+def command_panels(data: PlotData, axis: TimeAxis) -> list[Panel]:
     """Commanded speed and turn rate with the limits that are near, and the stops."""
-    commands, controller = shown.columns.commands, shown.evidence.scenario.controller
-    during = inside(commands.issued_ns, shown.columns.run)
+    commands, controller = data.columns.commands, data.run_data.scenario.controller
+    during = inside(commands.issued_ns, data.columns.run)
     if not np.any(during):
         return []
-    t, stops = shown.seconds(commands.issued_ns[during]), stops_of(shown)
+    t, stops = data.seconds(commands.issued_ns[during]), stops_of(data)
     speed = _panel(axis, "speed", "v₂", "m/s", t, commands.v2[during], controller.v_max, stops)
     turn = _panel(axis, "turn rate", "u₂", "rad/s", t, commands.u2[during], controller.u_max, stops)
     return [speed, turn]
@@ -58,7 +58,7 @@ def _panel(
     t: FloatArray,
     sent: FloatArray,
     limit: float,
-    stops: Sequence[Spell],
+    stops: Sequence[TimeInterval],
 ) -> Panel:
     low, high = min(float(np.min(sent)), 0.0), float(np.max(sent))
     # A limit far outside what is driven would only flatten the curve.
@@ -78,11 +78,11 @@ def _panel(
     return Panel(f"Commanded {what} {symbol}", f"The follower's {what} as commanded.", tuple(keys), plot)
 
 
-def _shade(plot: figure, stops: Sequence[Spell], y: tuple[float, float]) -> None:
+def _shade(plot: figure, stops: Sequence[TimeInterval], y: tuple[float, float]) -> None:
     held = {
-        "left": [spell.from_s for spell in stops],
-        "right": [spell.to_s for spell in stops],
-        "why": [spell.what for spell in stops],
+        "left": [interval.from_s for interval in stops],
+        "right": [interval.to_s for interval in stops],
+        "why": [interval.what for interval in stops],
     }
     area = Quad(
         left="left", right="right", bottom=y[0], top=y[1],

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from estimation.tracking.estimate import QUANTITIES
 from formation.angles import FloatArray
-from hil.figures.shown import Shown, broken_at_jumps, outside
+from hil.figures.plot_data import PlotData, broken_at_jumps, outside
 from hil.judge.columns import EstimateColumns, inside
 from hil.judge.estimation import errors_at
 from hil.reports.certified_lines import draw_certified, largest_radius
+from hil.reports.decimation import decimated_rows
 from hil.reports.plots import (
     BELIEVED,
     BOUND,
@@ -31,7 +32,6 @@ from hil.reports.plots import (
     marks,
     table,
 )
-from hil.reports.thinning import telling_rows
 
 _FARTHEST = 4.0
 """A bound so many times beyond what else is in the picture would flatten it, and is left to the words."""
@@ -55,73 +55,73 @@ _SHOWN = (
 _RATES = {"rho_dot": "M_rho", "alpha2_dot": "M_alpha2"}
 
 
-def estimate_panels(shown: Shown, axis: TimeAxis) -> list[Panel]:
+def estimate_panels(data: PlotData, axis: TimeAxis) -> list[Panel]:
     """For every quantity its course, and where the truth is known its error; empty without estimates."""
-    during = inside(shown.tracked.capture_ns, shown.columns.run)
+    during = inside(data.tracked.capture_ns, data.columns.run)
     if not np.any(during):
         return []
-    errors = errors_at(shown.tracked, shown.tracked_true)
+    errors = errors_at(data.tracked, data.tracked_true)
     panels = []
     for quantity in _SHOWN:
         error = errors.get(quantity.name)
-        panels.append(_course(shown, axis, quantity, during, judged=error is None))
+        panels.append(_course(data, axis, quantity, during, judged=error is None))
         if error is not None:
-            panels.append(_error(shown, axis, quantity, during, error))
+            panels.append(_error(data, axis, quantity, during, error))
     return panels
 
 
 def _course(
-    shown: Shown, axis: TimeAxis, quantity: _Quantity, during: NDArray[np.bool_], *, judged: bool
+    data: PlotData, axis: TimeAxis, quantity: _Quantity, during: NDArray[np.bool_], *, judged: bool
 ) -> Panel:
     """An estimate with three standard deviations and truth; with its bound if no error panel shows that."""
-    t = shown.seconds(shown.tracked.capture_ns)[during]
-    value = broken_at_jumps(_values(shown.tracked, quantity.name)[during])
-    reach = 3.0 * shown.tracked.sd[during, QUANTITIES.index(quantity.name)]
+    t = data.seconds(data.tracked.capture_ns)[during]
+    value = broken_at_jumps(_values(data.tracked, quantity.name)[during])
+    reach = 3.0 * data.tracked.sd[during, QUANTITIES.index(quantity.name)]
     source = table(t, value, {"y": value, "low": value - reach, "high": value + reach, "reach": reach})
-    truth = shown.columns.truth
-    known = inside(truth.capture_ns, shown.columns.run) & np.isfinite(getattr(truth, quantity.name))
+    truth = data.columns.truth
+    known = inside(truth.capture_ns, data.columns.run) & np.isfinite(getattr(truth, quantity.name))
     true = broken_at_jumps(np.asarray(getattr(truth, quantity.name))[known])
-    plot = axis.panel(f"{quantity.symbol} [{quantity.unit}]", _limits(shown, quantity, value, true))
+    plot = axis.panel(f"{quantity.symbol} [{quantity.unit}]", _limits(data, quantity, value, true))
     keys = [Key("estimate", BELIEVED), Key("3 σ", BELIEVED, "band")]
     tips = {"t": "@t{0.00} s", "estimate": f"@y{{0.0000}} {quantity.unit}", "3 σ": "±@reach{0.0000}"}
     draw_band(plot, source, "low", "high", BELIEVED)
     hover(plot, draw_line(plot, source, "y", BELIEVED, width=1.1), tips)
     says = f"{quantity.says} as estimated"
     if len(true):
-        told = table(shown.seconds(truth.capture_ns[known]), true, {"y": true})
-        draw_line(plot, told, "y", TRUE)
+        truth_table = table(data.seconds(truth.capture_ns[known]), true, {"y": true})
+        draw_line(plot, truth_table, "y", TRUE)
         keys.append(Key("truth", TRUE))
         says += ", and as it was"
-    bound = _bound(shown, quantity.name) if judged else None
+    bound = _bound(data, quantity.name) if judged else None
     if bound is not None:
-        at, centre = _judged(shown), _values(shown.columns.samples, quantity.name)
+        at, centre = _judged(data), _values(data.columns.samples, quantity.name)
         sides = table(at, bound, {"low": centre - bound, "high": centre + bound})
         for side in ("low", "high"):
             draw_line(plot, sides, side, BOUND, width=1.0)
         keys.append(Key("assumed bound", BOUND))
         says += f"; its error is bounded by {_range(bound, quantity.unit)} if the scenario's noise holds"
-    if judged and largest_radius(shown, quantity.name) is not None:
-        keys.append(draw_certified(plot, shown, quantity.name, of_error=False))
+    if judged and largest_radius(data, quantity.name) is not None:
+        keys.append(draw_certified(plot, data, quantity.name, of_error=False))
     return Panel(quantity.says, says + ".", tuple(keys), plot)
 
 
 def _error(
-    shown: Shown, axis: TimeAxis, quantity: _Quantity, during: NDArray[np.bool_], error: FloatArray
+    data: PlotData, axis: TimeAxis, quantity: _Quantity, during: NDArray[np.bool_], error: FloatArray
 ) -> Panel:
     """Estimate minus truth between three standard deviations and the bound; samples outside are marked."""
-    t, error = shown.seconds(shown.tracked.capture_ns)[during], error[during]
-    reach = 3.0 * shown.tracked.sd[during, QUANTITIES.index(quantity.name)]
+    t, error = data.seconds(data.tracked.capture_ns)[during], error[during]
+    reach = 3.0 * data.tracked.sd[during, QUANTITIES.index(quantity.name)]
     largest = float(np.max(np.abs(error), where=np.isfinite(error), initial=0.0))
     height = min(
         max(1.1 * largest, 1.4 * float(np.median(reach))), 4.0 * float(np.median(reach)) + 1.1 * largest
     )
     keys = [Key("error", BELIEVED), Key("3 σ", BELIEVED, "band")]
     says = f"Error of {quantity.symbol}: estimate minus truth."
-    bound = _bound(shown, quantity.name)
+    bound = _bound(data, quantity.name)
     drawn = bound is not None and float(np.min(bound)) < _FARTHEST * height
     if bound is not None and drawn:
         height = max(height, min(1.1 * float(np.max(bound)), _FARTHEST * height))
-    radius = largest_radius(shown, quantity.name)
+    radius = largest_radius(data, quantity.name)
     certified = radius is not None and radius < _FARTHEST * height
     if radius is not None:
         height = max(height, 1.1 * radius) if certified else height
@@ -138,20 +138,20 @@ def _error(
     }
     hover(plot, draw_line(plot, source, "y", BELIEVED, width=1.1), tips)
     if certified:
-        keys.append(draw_certified(plot, shown, quantity.name, of_error=True))
+        keys.append(draw_certified(plot, data, quantity.name, of_error=True))
     if bound is not None:
         label = f"largest judged error {_RATES[quantity.name]}" if quantity.name in _RATES else "bound"
         says += f" {label[0].upper()}{label[1:]}: {_range(bound, quantity.unit)}"
         says += "." if drawn else ", outside the picture."
         if drawn:
-            sides = table(_judged(shown), bound, {"high": bound, "low": -bound})
+            sides = table(_judged(data), bound, {"high": bound, "low": -bound})
             for side in ("low", "high"):
                 draw_line(plot, sides, side, BOUND, width=1.0)
             keys.append(Key(label, BOUND))
-        at_samples = errors_at(shown.columns.samples, shown.columns.true).get(quantity.name)
+        at_samples = errors_at(data.columns.samples, data.columns.true).get(quantity.name)
         broken = None if at_samples is None else outside(np.abs(at_samples), bound)
         if at_samples is not None and broken is not None and np.any(broken):
-            _mark(plot, _judged(shown)[broken], at_samples[broken], height)
+            _mark(plot, _judged(data)[broken], at_samples[broken], height)
             keys.append(Key(f"violated ({np.count_nonzero(broken)})", BOUND, "cross"))
             says += f" Violated in {np.count_nonzero(broken)} of {len(bound)} samples."
     return Panel(f"Error of {quantity.symbol}", says, tuple(keys), plot)
@@ -161,21 +161,21 @@ def _values(estimates: EstimateColumns, name: str) -> FloatArray:
     return estimates.u1 if name == "u1" else np.asarray(getattr(estimates.seen, name), dtype=np.float64)
 
 
-def _judged(shown: Shown) -> FloatArray:
-    return shown.seconds(shown.columns.samples.capture_ns)
+def _judged(data: PlotData) -> FloatArray:
+    return data.seconds(data.columns.samples.capture_ns)
 
 
-def _bound(shown: Shown, name: str) -> FloatArray | None:
+def _bound(data: PlotData, name: str) -> FloatArray | None:
     """Bound of a quantity's error at every judged sample; of rates what the other bounds rest on."""
-    if name in _RATES and shown.worst is not None:
-        rate = np.asarray(getattr(shown.worst.rates, _RATES[name]), dtype=np.float64)
-        return np.broadcast_to(rate, (len(shown.columns.samples.capture_ns),))
-    return shown.bounds.get(name + shown.drawn_bound)
+    if name in _RATES and data.worst is not None:
+        rate = np.asarray(getattr(data.worst.rates, _RATES[name]), dtype=np.float64)
+        return np.broadcast_to(rate, (len(data.columns.samples.capture_ns),))
+    return data.bounds.get(name + data.drawn_bound)
 
 
-def _limits(shown: Shown, quantity: _Quantity, value: FloatArray, true: FloatArray) -> tuple[float, float]:
+def _limits(data: PlotData, quantity: _Quantity, value: FloatArray, true: FloatArray) -> tuple[float, float]:
     """Limits of a course; what no leader of the scenario can do belongs to the settling and is cut off."""
-    leader = shown.evidence.scenario.leader
+    leader = data.run_data.scenario.leader
     if quantity.name == "v1":
         return limits_around(value, true, floor=0.0, ceiling=1.8 * max(leader.k_v, float(np.median(value))))
     if quantity.name == "u1":
@@ -190,6 +190,6 @@ def _range(bound: FloatArray, unit: str) -> str:
 
 def _mark(plot: figure, t: FloatArray, error: FloatArray, height: float) -> None:
     """Crosses at samples that violate their bound; those beyond the picture at its edge."""
-    rows = telling_rows(error)
-    shown_at = np.clip(error[rows], -0.97 * height, 0.97 * height)
-    draw_marks(plot, marks(t[rows], shown_at), "x", BOUND, 8.0)
+    rows = decimated_rows(error)
+    drawn_at = np.clip(error[rows], -0.97 * height, 0.97 * height)
+    draw_marks(plot, marks(t[rows], drawn_at), "x", BOUND, 8.0)

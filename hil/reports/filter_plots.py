@@ -10,8 +10,10 @@ from bokeh.models.glyphs import HBar
 
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
-from hil.figures.shown import LONGEST_LINE, Shown
+from hil.figures.plot_data import LONGEST_LINE, PlotData
 from hil.judge.columns import inside
+from hil.reports.decimation import decimated_rows
+from hil.reports.intervals import intervals_of
 from hil.reports.plots import (
     BELIEVED,
     BOUND,
@@ -29,8 +31,6 @@ from hil.reports.plots import (
     marks,
     table,
 )
-from hil.reports.spells import spells_of
-from hil.reports.thinning import telling_rows
 
 _STATUS_COLOURS = {
     Status.INITIALISING: GREY,
@@ -43,26 +43,26 @@ _EXPECTED_NIS = 2.0
 _ROW_HEIGHT, _AXIS_HEIGHT = 30, 90
 
 
-def status_panel(shown: Shown, axis: TimeAxis) -> Panel | None:
+def status_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
     """What the estimates said of themselves; None without any."""
-    estimates = shown.columns.estimates
-    during = inside(estimates.capture_ns, shown.columns.run)
+    estimates = data.columns.estimates
+    during = inside(estimates.capture_ns, data.columns.run)
     if not np.any(during):
         return None
     statuses = [Status(code) for code in estimates.status[during].tolist()]
     names = [status.name.lower() for status in statuses]
-    spells = spells_of(shown.seconds(estimates.capture_ns[during]), names, LONGEST_LINE)
+    intervals = intervals_of(data.seconds(estimates.capture_ns[during]), names, LONGEST_LINE)
     occurring = [status for status in Status if status in statuses]
     rows = [status.name.lower() for status in reversed(occurring)]
     plot = axis.panel("", rows, _AXIS_HEIGHT + _ROW_HEIGHT * len(rows))
     plot.min_border_left = 78
     for status in occurring:
-        own = [spell for spell in spells if spell.what == status.name.lower()]
+        own = [interval for interval in intervals if interval.what == status.name.lower()]
         held = {
-            "row": [spell.what for spell in own],
-            "from": [spell.from_s for spell in own],
-            "to": [spell.to_s for spell in own],
-            "count": [spell.count for spell in own],
+            "row": [interval.what for interval in own],
+            "from": [interval.from_s for interval in own],
+            "to": [interval.to_s for interval in own],
+            "count": [interval.count for interval in own],
         }
         colour = _STATUS_COLOURS[status]
         bar = HBar(
@@ -75,19 +75,19 @@ def status_panel(shown: Shown, axis: TimeAxis) -> Panel | None:
     return Panel("Status", f"What the estimates said of themselves: {shares}.", (), plot)
 
 
-def nis_panel(shown: Shown, axis: TimeAxis) -> Panel | None:
+def nis_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
     """Normalised innovation squared of every estimate against its mean and the gate."""
-    estimates = shown.columns.estimates
-    known = inside(estimates.capture_ns, shown.columns.run) & np.isfinite(estimates.nis)
+    estimates = data.columns.estimates
+    known = inside(estimates.capture_ns, data.columns.run) & np.isfinite(estimates.nis)
     if not np.any(known):
         return None
-    t, nis = shown.seconds(estimates.capture_ns[known]), estimates.nis[known]
-    gate = -2.0 * math.log1p(-shown.evidence.scenario.estimator.gate_probability)
+    t, nis = data.seconds(estimates.capture_ns[known]), estimates.nis[known]
+    gate = -2.0 * math.log1p(-data.run_data.scenario.estimator.gate_probability)
     top = 1.25 * gate
     plot = axis.panel("NIS", (0.0, top))
     for level, colour, dash in ((_EXPECTED_NIS, GREY, "solid"), (gate, BOUND, "dashed")):
         draw_level(plot, level, colour, dash)
-    rows = telling_rows(nis)
+    rows = decimated_rows(nis)
     t, nis, over = t[rows], nis[rows], nis[rows] > top
     dots = draw_marks(plot, marks(t[~over], nis[~over]), "circle", BELIEVED, 3.0)
     hover(plot, dots, {"t": "@t{0.00} s", "NIS": "@y{0.00}"}, mode="mouse")
@@ -105,13 +105,13 @@ def nis_panel(shown: Shown, axis: TimeAxis) -> Panel | None:
     return Panel("Innovation", says, tuple(keys), plot)
 
 
-def latency_panel(shown: Shown, axis: TimeAxis) -> Panel | None:
+def latency_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
     """Age of what every command rests on; the first command on a capture gives the latency."""
-    commands = shown.columns.commands
-    based = inside(commands.issued_ns, shown.columns.run) & (commands.capture_ns > 0)
+    commands = data.columns.commands
+    based = inside(commands.issued_ns, data.columns.run) & (commands.capture_ns > 0)
     if not np.any(based):
         return None
-    t = shown.seconds(commands.issued_ns[based])
+    t = data.seconds(commands.issued_ns[based])
     age_ms: FloatArray = (commands.issued_ns - commands.capture_ns)[based] * np.float64(1e-6)
     plot = axis.panel("age [ms]", (0.0, 1.15 * float(np.max(age_ms))))
     line = draw_line(plot, table(t, age_ms, {"y": age_ms}), "y", FOLLOWER, width=1.0)
@@ -119,7 +119,7 @@ def latency_panel(shown: Shown, axis: TimeAxis) -> Panel | None:
     keys = [Key("age of the capture behind every command", FOLLOWER)]
     fresh = commands.fresh[based]
     if np.any(fresh):
-        rows = telling_rows(age_ms[fresh])
+        rows = decimated_rows(age_ms[fresh])
         draw_marks(plot, marks(t[fresh][rows], age_ms[fresh][rows]), "circle", BELIEVED, 3.0)
         keys.append(Key("latency: first command on a capture", BELIEVED, "dot"))
     return Panel("Latency and age", "How old the motion capture behind the commands was.", tuple(keys), plot)

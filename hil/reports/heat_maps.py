@@ -173,14 +173,19 @@ def _look(
 ) -> tuple[str, str, str, str]:
     """Colour, colour of the letters, letters, and what is told under the pointer."""
     value = merit.value(cell, quantity)
-    told = f"cell {number}, {cell['runs']} runs, {cell['diverged']} diverged"
+    tooltip = f"cell {number}, {cell['runs']} runs, {cell['diverged']} diverged"
     if value is None:
-        return "#eeeeee", DARK, "–", f"not known; {told}"
+        return "#eeeeee", DARK, "–", f"not known; {tooltip}"
     low, high = scale
     share = (math.log(value) - low) / (high - low) if value > 0.0 and high > low else 0.0
     # Yellow is the good end, dark blue the bad one.
     colour = Cividis256[255 - round(255 * min(max(share, 0.0), 1.0))]
-    return colour, "#000000" if _luminance(colour) > _BRIGHT else "#ffffff", merit.text(value, quantity), told
+    return (
+        colour,
+        "#000000" if _luminance(colour) > _BRIGHT else "#ffffff",
+        merit.text(value, quantity),
+        tooltip,
+    )
 
 
 def _luminance(colour: str) -> float:

@@ -13,7 +13,7 @@ from hil.errors import UsageError
 from hil.log.report_json import write_json
 
 if TYPE_CHECKING:
-    from hil.judge.evidence import Evidence
+    from hil.judge.run_data import RunData
     from hil.log.reader import Log
 
 
@@ -42,23 +42,23 @@ def claimed(folder: Path) -> Iterator[None]:
 
 def judge_log(log: Log, folder: Path) -> dict[str, Any]:
     """Summary of the log of a pair; ``summary.json``, ``run.png`` and ``report.html`` go into the folder."""
-    from hil.judge.evidence import evidence_of_log
+    from hil.judge.run_data import run_data_of_log
     from hil.judge.summary import summarise
 
-    evidence = evidence_of_log(log)
-    summary = summarise(evidence)
-    leave(evidence, summary, folder, "run.png")
+    run_data = run_data_of_log(log)
+    summary = summarise(run_data)
+    leave(run_data, summary, folder, "run.png")
     return summary
 
 
-def leave(evidence: Evidence, summary: Mapping[str, Any], folder: Path, picture: str) -> None:
-    """Write the summary of an evidence, its picture by the given name, and its report."""
+def leave(run_data: RunData, summary: Mapping[str, Any], folder: Path, picture: str) -> None:
+    """Write the summary of a run's data, its picture by the given name, and its report."""
     # All that drawing needs: a second of imports, for those who ask only.
+    from hil.figures.plot_data import PlotData
     from hil.figures.run_figures import draw_run
-    from hil.figures.shown import Shown
     from hil.reports.run_report import run_report
 
     write_json(summary, folder / "summary.json")
-    shown = Shown.of(evidence)
-    draw_run(shown, summary, folder / picture)
-    (folder / "report.html").write_text(run_report(shown, summary), encoding="utf-8")
+    data = PlotData.of(run_data)
+    draw_run(data, summary, folder / picture)
+    (folder / "report.html").write_text(run_report(data, summary), encoding="utf-8")

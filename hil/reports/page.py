@@ -52,12 +52,12 @@ def page(title: str, head: str, sections: Sequence[Section], script: str = "") -
     ``script``: JavaScript that runs once the page is there. A section with neither HTML nor panels is left
     out.
     """
-    told = [section for section in sections if section.html or section.panels]
+    filled = [section for section in sections if section.html or section.panels]
     places = {
-        f"plot{n}": panel for n, panel in enumerate(panel for section in told for panel in section.panels)
+        f"plot{n}": panel for n, panel in enumerate(panel for section in filled for panel in section.panels)
     }
     place_of = {id(panel): place for place, panel in places.items()}
-    body = "\n".join(_section(section, place_of) for section in told)
+    body = "\n".join(_section(section, place_of) for section in filled)
     plots = _plots({place: panel.plot for place, panel in places.items()}) if places else ""
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
@@ -124,11 +124,11 @@ def _plots(plots: Mapping[str, figure]) -> str:
     with document.models.freeze():  # else every plot added looks through all before it
         for plot in plots.values():
             document.add_root(plot)
-    told: dict[str, Any] = {_DOCUMENT: document.to_json(deferred=False)}
+    embedded: dict[str, Any] = {_DOCUMENT: document.to_json(deferred=False)}
     items = [{"docid": _DOCUMENT, "roots": {plot.id: place for place, plot in plots.items()}}]
     items[0]["root_ids"] = [plot.id for plot in plots.values()]
     library = "\n".join(Resources(mode="inline", components=["bokeh"], log_level="warn").js_raw)
-    data = serialize_json(told).replace("</", "<\\/")
+    data = serialize_json(embedded).replace("</", "<\\/")
     call = _DRAW % serialize_json(items)
     return (
         "<noscript><p>The plots need JavaScript; the tables above do not.</p></noscript>\n"

@@ -17,8 +17,8 @@ from bokeh.models.renderers import GlyphRenderer
 from bokeh.plotting import figure
 
 from formation.angles import FloatArray
-from hil.figures.shown import LONGEST_LINE
-from hil.reports.thinning import telling_rows
+from hil.figures.plot_data import LONGEST_LINE
+from hil.reports.decimation import decimated_rows
 
 # Colours of Okabe and Ito, told apart by eyes of every kind; bounds and limits differ by their dashes, too.
 BLUE, VERMILION, PURPLE, DARK, GREY = "#0072b2", "#d55e00", "#a8478a", "#333333", "#767676"
@@ -111,12 +111,12 @@ def blank(*, height: int, x_label: str, y_label: str, tools: str, x_range: Range
 
 
 def table(t: FloatArray, by: FloatArray, columns: Mapping[str, FloatArray]) -> ColumnDataSource:
-    """Columns over time, thinned by the peaks of ``by`` and broken where the time jumps."""
+    """Columns over time, decimated by the peaks of ``by`` and broken where the time jumps."""
     holes = np.flatnonzero(np.diff(t) > LONGEST_LINE) + 1
-    rows = telling_rows(np.insert(by, holes, math.nan))
-    told = {name: np.insert(values, holes, math.nan)[rows] for name, values in columns.items()}
+    rows = decimated_rows(np.insert(by, holes, math.nan))
+    decimated = {name: np.insert(values, holes, math.nan)[rows] for name, values in columns.items()}
     return ColumnDataSource(
-        {"t": np.insert(t, holes, t[holes])[rows]} | {k: _short(v) for k, v in told.items()}
+        {"t": np.insert(t, holes, t[holes])[rows]} | {k: _short(v) for k, v in decimated.items()}
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hil.figures.shown import Shown
+from hil.figures.plot_data import PlotData
 from hil.judge.summary_text import BAD, GOOD, verdict_lines, warnings_of
 from hil.reports.bound_plot import tightness_panel
 from hil.reports.command_plots import command_panels, stops_of
@@ -23,29 +23,27 @@ from hil.reports.track_plot import track_panel
 _MARKS = {GOOD: ("good", "✓ "), BAD: ("bad", "✗ ")}
 
 
-def run_report(shown: Shown, summary: Mapping[str, Any]) -> str:
-    """HTML of a page that needs nothing but itself; ``summary`` is that of the same evidence.
+def run_report(data: PlotData, summary: Mapping[str, Any]) -> str:
+    """HTML of a page that needs nothing but itself; ``summary`` is that of the same run data.
 
     What cannot be known is left out. Depends on its arguments alone, and on the version of Bokeh.
     """
-    run, span = shown.columns.run, shown.columns.span
-    moments = shown.seconds(np.array([run.from_ns, run.to_ns, span.from_ns]))
+    run, span = data.columns.run, data.columns.span
+    moments = data.seconds(np.array([run.from_ns, run.to_ns, span.from_ns]))
     axis = TimeAxis(*moments.tolist())
-    tracks = track_panel(shown)
+    tracks = track_panel(data)
     sections = [
         Section("Figures", summary_tables(summary)),
-        Section("The formation", panels=[*([tracks] if tracks else []), *shape_panels(shown, axis)]),
+        Section("The formation", panels=[*([tracks] if tracks else []), *shape_panels(data, axis)]),
         Section(
             "What the follower believed of the leader",
-            panels=[*estimate_panels(shown, axis), *filter(None, [tightness_panel(shown, axis)])],
+            panels=[*estimate_panels(data, axis), *filter(None, [tightness_panel(data, axis)])],
         ),
-        Section(
-            "What the follower was told to do", stops_table(stops_of(shown)), command_panels(shown, axis)
-        ),
+        Section("What the follower was told to do", stops_table(stops_of(data)), command_panels(data, axis)),
         Section(
             "How the estimates came about",
             panels=list(
-                filter(None, (panel(shown, axis) for panel in (status_panel, nis_panel, latency_panel)))
+                filter(None, (panel(data, axis) for panel in (status_panel, nis_panel, latency_panel)))
             ),
         ),
     ]
@@ -79,12 +77,14 @@ def _head(summary: Mapping[str, Any]) -> str:
         verdict = "Nothing speaks against it."
     colour = "verdict bad" if broken else "verdict"
     listed = "".join(f"<li>{escape(warning)}</li>" for warning in warnings)
-    told = "".join(f"<dt>{escape(name)}</dt>{_finding(finding, style)}" for name, finding, style in lines)
+    report_lines = "".join(
+        f"<dt>{escape(name)}</dt>{_finding(finding, style)}" for name, finding, style in lines
+    )
     return (
         f"<h1>{escape(' · '.join(_names(summary)))}</h1>\n"
         f'<div class="{colour}"><p><strong>{escape(verdict)}</strong></p>'
         + (f"<ul>{listed}</ul>" if listed else "")
-        + f"</div>\n<dl>{told}</dl>\n"
+        + f"</div>\n<dl>{report_lines}</dl>\n"
     )
 
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from math import degrees
 from typing import Any
 
+from hil.reports.intervals import TimeInterval
 from hil.reports.page import table_html
-from hil.reports.spells import Spell
 
 QUANTITIES = {
     "v1": ("v₁", "mm/s"),
@@ -58,7 +58,7 @@ _COUNTS = {
 }
 _MOST_STOPS = 20
 _CERTIFICATE, _WORDS = "certificate", ("why", "assumes")
-_TOLD = (
+_HEAD = (
     "scenario",
     "seed",
     "mode",
@@ -75,7 +75,7 @@ _TOLD = (
 def summary_tables(summary: Mapping[str, Any]) -> str:
     """Tables of all figures of a summary, with units; what the summary lacks is not there."""
     left = dict(_leaves(summary, ""))
-    for name in _TOLD:
+    for name in _HEAD:
         left.pop(name, None)
     tables = [_quality(left), _bounds(left)]
     for group, caption in _COUNTS.items():
@@ -103,12 +103,12 @@ def summary_tables(summary: Mapping[str, Any]) -> str:
     )
 
 
-def stops_table(stops: Sequence[Spell]) -> str:
+def stops_table(stops: Sequence[TimeInterval]) -> str:
     """When and why the robot was told to stand still; the longest if there are many."""
-    longest = sorted(stops, key=lambda spell: spell.from_s - spell.to_s)[:_MOST_STOPS]
+    longest = sorted(stops, key=lambda interval: interval.from_s - interval.to_s)[:_MOST_STOPS]
     rows = [
-        (spell.what, f"{spell.from_s:.2f}", f"{spell.to_s:.2f}", str(spell.count))
-        for spell in sorted(longest, key=lambda spell: spell.from_s)
+        (interval.what, f"{interval.from_s:.2f}", f"{interval.to_s:.2f}", str(interval.count))
+        for interval in sorted(longest, key=lambda interval: interval.from_s)
     ]
     more = f"; the {_MOST_STOPS} longest of {len(stops)}" if len(stops) > _MOST_STOPS else ""
     return table_html(f"Told to stand still{more}", ("reason", "from [s]", "to [s]", "commands"), rows)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation.angles import FloatArray
-from hil.figures.shown import Shown, broken_at_jumps
+from hil.figures.plot_data import PlotData, broken_at_jumps
 from hil.judge.columns import inside
 from hil.reports.plots import (
     BELIEVED,
@@ -32,33 +32,33 @@ _SHAPES = (
 )
 
 
-def shape_panels(shown: Shown, axis: TimeAxis) -> list[Panel]:
+def shape_panels(data: PlotData, axis: TimeAxis) -> list[Panel]:
     """Panels of rho, alpha1 and alpha2: true where that is known, else as estimated."""
-    truth, columns = shown.columns.truth, shown.columns
+    truth, columns = data.columns.truth, data.columns
     known = inside(truth.capture_ns, columns.run) & np.isfinite(truth.rho)
     if np.any(known):
-        t = shown.seconds(truth.capture_ns[known])
+        t = data.seconds(truth.capture_ns[known])
         courses = [np.asarray(getattr(truth, name))[known] for name, *_ in _SHAPES]
-        return _panels(shown, axis, t, courses, _noise_free(shown, known), estimated=False)
-    seen = inside(shown.tracked.capture_ns, columns.run)
+        return _panels(data, axis, t, courses, _noise_free(data, known), estimated=False)
+    seen = inside(data.tracked.capture_ns, columns.run)
     if not np.any(seen):
         return []
-    t = shown.seconds(shown.tracked.capture_ns[seen])
-    courses = [np.asarray(getattr(shown.tracked.seen, name))[seen] for name, *_ in _SHAPES]
-    return _panels(shown, axis, t, courses, None, estimated=True)
+    t = data.seconds(data.tracked.capture_ns[seen])
+    courses = [np.asarray(getattr(data.tracked.seen, name))[seen] for name, *_ in _SHAPES]
+    return _panels(data, axis, t, courses, None, estimated=True)
 
 
-def _noise_free(shown: Shown, known: NDArray[np.bool_]) -> list[FloatArray] | None:
+def _noise_free(data: PlotData, known: NDArray[np.bool_]) -> list[FloatArray] | None:
     """The noise-free run at the known truths, NaN before it begins."""
-    if shown.orbit is None:
+    if data.orbit is None:
         return None
-    moments = shown.columns.truth.capture_ns[known]
-    before = moments < shown.orbit.from_ns
-    return [np.where(before, math.nan, course) for course in shown.orbit.at(moments)]
+    moments = data.columns.truth.capture_ns[known]
+    before = moments < data.orbit.from_ns
+    return [np.where(before, math.nan, course) for course in data.orbit.at(moments)]
 
 
 def _panels(
-    shown: Shown,
+    data: PlotData,
     axis: TimeAxis,
     t: FloatArray,
     courses: list[FloatArray],
@@ -67,8 +67,8 @@ def _panels(
     estimated: bool,
 ) -> list[Panel]:
     colour, label = (BELIEVED, "estimate") if estimated else (TRUE, "truth")
-    driven = shown.evidence.motion_since_ns is not None
-    since, desired = shown.desired()
+    driven = data.run_data.motion_since_ns is not None
+    since, desired = data.desired()
     panels = []
     for k, (name, symbol, unit, title, says) in enumerate(_SHAPES):
         held = {"y": broken_at_jumps(courses[k])}

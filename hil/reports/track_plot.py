@@ -10,10 +10,10 @@ from bokeh.models.ranges import DataRange1d
 from bokeh.plotting import figure
 
 from formation.angles import FloatArray
-from hil.figures.shown import Shown, with_gaps
+from hil.figures.plot_data import PlotData, with_gaps
 from hil.judge.columns import inside
+from hil.reports.decimation import MOST_POINTS, spread_rows
 from hil.reports.plots import FOLLOWER, GREY, LEADER, Key, Panel, blank, hover
-from hil.reports.thinning import MOST_POINTS, spread_rows
 
 _HEIGHT = 460
 _MOMENTS = 7
@@ -22,14 +22,14 @@ _MARK_SHARE = 0.03
 _MARK = np.array([(1.0, 0.0), (-0.7, 0.62), (-0.4, 0.0), (-0.7, -0.62)])
 
 
-def track_panel(shown: Shown) -> Panel | None:
+def track_panel(data: PlotData) -> Panel | None:
     """Tracks of both robots in the world frame [m]; None where the truth is not known."""
-    columns = shown.columns
+    columns = data.columns
     both = np.column_stack([columns.truth.leader, columns.truth.follower])
     known = inside(columns.truth.capture_ns, columns.run) & np.all(np.isfinite(both), axis=1)
     if not np.any(known):
         return None
-    t, both = shown.seconds(columns.truth.capture_ns[known]), both[known]
+    t, both = data.seconds(columns.truth.capture_ns[known]), both[known]
     plot = blank(
         height=_HEIGHT,
         x_label="x [m]",

@@ -1,11 +1,11 @@
-"""A scenario's certificate: its premises from the scenario, its JSON, and its text."""
+"""A scenario's certificate: its assumptions from the scenario, its JSON, and its text."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from estimation.bounds.premises import Premises
+from estimation.bounds.assumptions import Assumptions
 from formation.shape import ABREAST_ALPHA2
 from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
@@ -24,14 +24,14 @@ def certificate_of(scenario: Scenario, *, driven: bool = True) -> Certificate:
     """
     from estimation.bounds.certificate import certify  # compiled kernels behind it: only for those who ask
 
-    return certify(premises_of(scenario, driven=driven))
+    return certify(assumptions_of(scenario, driven=driven))
 
 
-def premises_of(scenario: Scenario, *, driven: bool = True) -> Premises:
+def assumptions_of(scenario: Scenario, *, driven: bool = True) -> Assumptions:
     """What the certificate of a scenario starts from."""
     leader, law = scenario.leader, scenario.controller
     eps, of_what = _noise(scenario)
-    return Premises(
+    return Assumptions(
         eps=eps,
         step=1.0 / scenario.mocap.rate_hz,
         v_eps=leader.v_eps,
@@ -81,8 +81,8 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
 
 
 def _claim_json(claim: Claim) -> dict[str, Any]:
-    told: dict[str, Any] = {**claim.figures, "assumes": list(claim.assumes)}
-    return told if claim.why is None else told | {"why": claim.why}
+    entry: dict[str, Any] = {**claim.figures, "assumes": list(claim.assumes)}
+    return entry if claim.why is None else entry | {"why": claim.why}
 
 
 _TITLES = {

@@ -10,7 +10,7 @@ from controllers.laws import Gains
 from controllers.limits import Limits
 from controllers.side_change import gentle
 from controllers.station_keeper import StationKeeper
-from estimation.tracking.foresight import Foresight
+from estimation.tracking.turn_prediction import TurnPrediction
 from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
 from formation.spacing import Spacing
 from formation.station import Side, Station
@@ -71,6 +71,6 @@ def station_keeper(scenario: Scenario) -> StationKeeper:
     )
 
 
-def foresight(scenario: Scenario) -> Foresight:
+def turn_prediction(scenario: Scenario) -> TurnPrediction:
     """What is known of the leader's steering; its diffusion is that of the estimator's own model."""
-    return Foresight.of(scenario.leader.k_u, process_noise(scenario).q_u)
+    return TurnPrediction.of(scenario.leader.k_u, process_noise(scenario).q_u)

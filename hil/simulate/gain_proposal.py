@@ -13,7 +13,7 @@ from formation.invariant_set import Disturbed, invariant_set
 from formation.shape import ABREAST_ALPHA2
 from formation.spacing import Spacing
 from hil.errors import UsageError
-from hil.scenario.certificate import certificate_of, premises_of
+from hil.scenario.certificate import assumptions_of, certificate_of
 from hil.scenario.leader_model import process_noise
 from hil.scenario.parts import limits
 from hil.scenario.schema import Scenario
@@ -22,21 +22,21 @@ from hil.scenario.schema import Scenario
 def task_of(scenario: Scenario) -> Task:
     """What a scenario asks of a follower, its estimates as good as a filter in its steady state makes them.
 
-    The filter of :mod:`estimation.tracking.foresight` on positions of standard deviation sigma has the corner
-    w0 = (v^2 q / (sigma^2 / rate))^(1/6) and the variance 3 w0^3 sigma^2 / rate of the leader's velocity.
-    Raises :class:`UsageError` for a station that is not abreast: the bounds hold there only.
+    The filter of :mod:`estimation.tracking.turn_prediction` on positions of standard deviation sigma has the
+    corner w0 = (v^2 q / (sigma^2 / rate))^(1/6) and the variance 3 w0^3 sigma^2 / rate of the leader's
+    velocity. Raises :class:`UsageError` for a station that is not abreast: the bounds hold there only.
     """
     if scenario.formation.bearing != ABREAST_ALPHA2:
         raise UsageError(
             f"scenario {scenario.name}: formation.bearing is {scenario.formation.bearing}, expected pi/2: "
             "gains are designed for followers abreast only; leave it out"
         )
-    given, leader, premises = scenario.estimator, scenario.leader, premises_of(scenario)
+    given, leader, assumptions = scenario.estimator, scenario.leader, assumptions_of(scenario)
     world = given.front_end == "world"
     rho_0, rate = scenario.formation.rho_0, scenario.mocap.rate_hz
     sigma = given.sigma_position if world else max(given.sigma_range, rho_0 * given.sigma_bearing)
     noise = process_noise(scenario)
-    slow, density = premises.speeds.lowest, sigma * sigma / rate
+    slow, density = assumptions.speeds.lowest, sigma * sigma / rate
     corner = (slow * slow * noise.q_u / density) ** (1.0 / 6.0)
     sd_v1 = math.sqrt(3.0 * corner**3 * density)
     across = math.sqrt(2.0) * sigma / rho_0
@@ -44,7 +44,7 @@ def task_of(scenario: Scenario) -> Task:
     return Task(
         rho_0=rho_0,
         limits=limits(scenario),
-        speeds=premises.speeds,
+        speeds=assumptions.speeds,
         k_u=leader.k_u,
         delay=scenario.mocap.latency_s + control.transport_s + control.lag_s,
         sd_v1=sd_v1,
@@ -84,7 +84,7 @@ def _outcome(found: Design, gains: tuple[float, float, float], task: Task) -> di
     }
 
 
-def told(proposal: dict[str, Any]) -> Iterator[str]:
+def report_lines(proposal: dict[str, Any]) -> Iterator[str]:
     """The proposal as lines of text."""
     gains = proposal["gains"]
     if gains is None:

@@ -99,8 +99,8 @@ class Sweep:
     def digest(self) -> str:
         """What tells this sweep from any other: a hash of all that its results depend on, our version too."""
         spec = msgspec.structs.replace(self.spec, description="")
-        told = msgspec.json.encode([__version__, spec, self.scenario])
-        return hashlib.sha256(told).hexdigest()
+        identity = msgspec.json.encode([__version__, spec, self.scenario])
+        return hashlib.sha256(identity).hexdigest()
 
 
 def load_sweep(name_or_path: str, overrides: Sequence[str] = (), **changes: Any) -> Sweep:
@@ -138,5 +138,5 @@ def run_seed(seed: int, run: int) -> int:
 
 def spec_json(spec: SweepSpec) -> dict[str, Any]:
     """Specification as plain values."""
-    told: dict[str, Any] = json.loads(msgspec.json.encode(spec))
-    return told
+    plain: dict[str, Any] = json.loads(msgspec.json.encode(spec))
+    return plain

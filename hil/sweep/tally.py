@@ -17,8 +17,8 @@ from formation.angles import FloatArray, wrap
 from hil.judge.bounds import judge_bounds
 from hil.judge.columns import Columns, CommandColumns, EstimateColumns, inside
 from hil.judge.estimation import WARM_UP_NS, estimate_errors, least_deviations
-from hil.judge.evidence import Span, judged_from_ns
 from hil.judge.noise_free_orbit import NoiseFreeOrbit, noise_free_orbit
+from hil.judge.run_data import Span, judged_from_ns
 from hil.judge.true_states import TrueStates
 from hil.lockstep.flyer import Flown, Flyer
 from hil.scenario.files import build_scenario, scenario_text, with_overrides
@@ -113,8 +113,8 @@ def true_states(flown: Flown, k: int, span: Span) -> TrueStates:
     rows = flown.truth[k :: flown.pairs]
     moments_ns = rows["at_ns"] - flown.since_ns
     rows = rows[np.searchsorted(moments_ns, span.from_ns) : np.searchsorted(moments_ns, span.to_ns, "right")]
-    told = np.column_stack([rows[body][name] for body, name in _TRUE])
-    return TrueStates.along(rows["at_ns"] - flown.since_ns, told)
+    recorded = np.column_stack([rows[body][name] for body, name in _TRUE])
+    return TrueStates.along(rows["at_ns"] - flown.since_ns, recorded)
 
 
 def _estimates(flown: Flown, k: int) -> EstimateColumns:

@@ -85,8 +85,10 @@ def _own_motion_noise(scenario: Scenario) -> tuple[float, float]:
     given = scenario.estimator
     if given.own_motion == "odometry":
         return given.sigma_v2, given.sigma_u2
-    told = FollowerMotion(0.0, 0.0, given.sigma_v2, given.sigma_u2) if given.own_motion == "fused" else None
-    return steady_noise(own_noise(scenario), 1.0 / scenario.mocap.rate_hz, told)
+    odometry = (
+        FollowerMotion(0.0, 0.0, given.sigma_v2, given.sigma_u2) if given.own_motion == "fused" else None
+    )
+    return steady_noise(own_noise(scenario), 1.0 / scenario.mocap.rate_hz, odometry)
 
 
 def perceived(estimate: Estimate) -> Perceived:

@@ -11,6 +11,7 @@ from formation.kernel import entry
 from formation.records import Buffer, Rows, borrowed, load, store
 from hil.wire import drive_layout, frame_layout, odometry_layout
 from hil.wire.assumed_errors import AssumedErrors
+from hil.wire.estimate_message import estimate_numbers, write_estimate_message
 from hil.wire.message_checks import check_frame, check_odometry, check_sighting
 from hil.wire.records import (
     Body,
@@ -22,7 +23,6 @@ from hil.wire.records import (
     Sighting,
     Wanted,
 )
-from hil.wire.told_estimate import told_numbers, write_told
 
 
 @entry
@@ -72,11 +72,11 @@ def write_drive(buffer: Buffer, twist_at: int, stamp_ns: int, v: float, u: float
 
 
 @entry
-def tell_estimate(
+def write_estimate(
     buffer: Buffer,
     times_at: int,
     reasons: bytes,
-    told: Rows[Estimate],
+    estimates: Rows[Estimate],
     assumed: Rows[AssumedErrors],
     reason: int,
     now_ns: int,
@@ -85,9 +85,9 @@ def tell_estimate(
 ) -> int:
     """Fill :func:`hil.wire.templates.estimate_template` with an estimate; returns the length.
 
-    ``told``, ``assumed``: one row. ``reason``: its number among ``reasons``. ``consumed``: how many of the
-    receipts are meant.
+    ``estimates``, ``assumed``: one row. ``reason``: its number among ``reasons``. ``consumed``: how many of
+    the receipts are meant.
     """
-    estimate = load(Estimate, told, 0)
-    numbers = told_numbers(estimate, load(AssumedErrors, assumed, 0), reason, consumed, now_ns)
-    return write_told(buffer, times_at, reasons, numbers, estimate.joint, borrowed(receipts))
+    estimate = load(Estimate, estimates, 0)
+    numbers = estimate_numbers(estimate, load(AssumedErrors, assumed, 0), reason, consumed, now_ns)
+    return write_estimate_message(buffer, times_at, reasons, numbers, estimate.joint, borrowed(receipts))

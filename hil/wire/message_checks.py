@@ -171,14 +171,14 @@ def planar(place: Placement) -> Pose:
 
 
 @kernel
-def check_odometry(told: Odometry, latest_ns: int) -> CheckedMotion:
+def check_odometry(odometry: Odometry, latest_ns: int) -> CheckedMotion:
     """Check a robot's own motion."""
-    cause = ACCEPTED if told.sound else MALFORMED
+    cause = ACCEPTED if odometry.sound else MALFORMED
     if cause == ACCEPTED:
-        cause = _pair_of_numbers_cause(told.v, told.u, FASTEST)
-    if cause == ACCEPTED and (not is_time(told.stamp) or ns_of(told.stamp) > latest_ns):
+        cause = _pair_of_numbers_cause(odometry.v, odometry.u, FASTEST)
+    if cause == ACCEPTED and (not is_time(odometry.stamp) or ns_of(odometry.stamp) > latest_ns):
         cause = BAD_STAMP
-    return CheckedMotion(cause, ns_of(told.stamp), told.v, told.u)
+    return CheckedMotion(cause, ns_of(odometry.stamp), odometry.v, odometry.u)
 
 
 @kernel

@@ -111,7 +111,7 @@ class LeaderEstimate:
 
 @dataclass(slots=True)
 class CertifiedEstimate:
-    """An estimate with guaranteed error radii, both NaN where ``failed`` names a premise that failed."""
+    """An estimate with guaranteed error radii, both NaN where ``failed`` names an assumption that failed."""
 
     header: Header
     computed: Time

@@ -44,15 +44,15 @@ def read_odometry(payload: bytes) -> Odometry:
 
 
 @kernel
-def write_odometry(buffer: Buffer, numbers_at: int, stamp_ns: int, told: Odometry) -> None:
+def write_odometry(buffer: Buffer, numbers_at: int, stamp_ns: int, odometry: Odometry) -> None:
     """Put stamp, pose and motion into an odometry message whose frames stand there already.
 
-    ``numbers_at``: as :func:`hil.wire.templates.odometry_template` has it; ``told`` has the rest.
+    ``numbers_at``: as :func:`hil.wire.templates.odometry_template` has it; ``odometry`` has the rest.
     """
     write_stamp(buffer, HEAD_BYTES, stamp_ns)
-    write_placement(buffer, numbers_at, told.place)
-    write_float(buffer, numbers_at + _TWIST_AT, told.v)
-    write_float(buffer, numbers_at + _TURN_AT, told.u)
+    write_placement(buffer, numbers_at, odometry.place)
+    write_float(buffer, numbers_at + _TWIST_AT, odometry.v)
+    write_float(buffer, numbers_at + _TURN_AT, odometry.u)
 
 
 @kernel

@@ -59,15 +59,17 @@ class EstimateWriter:
         self._reasons = packed_texts(reasons)
         self._receipts = ReceiptRows()
 
-    def write(self, told: Rows[Estimate], reason: int, now_ns: int, receipts: Sequence[Receipt]) -> bytes:
+    def write(
+        self, estimates: Rows[Estimate], reason: int, now_ns: int, receipts: Sequence[Receipt]
+    ) -> bytes:
         """Bytes of the estimate in a row, made at a time."""
         buffer, times_at = self._template
         consumed = self._receipts.fill(receipts)
-        length = entries.tell_estimate(
+        length = entries.write_estimate(
             buffer,
             times_at,
             self._reasons,
-            told,
+            estimates,
             self._assumed,
             reason,
             now_ns,

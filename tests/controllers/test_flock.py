@@ -68,8 +68,8 @@ def test_the_compiled_flock_is_that_of_the_laws(seed: int, law: str, most: int, 
     chosen = np.empty((21, most), dtype=np.int64)
     kernels.choose(state, may_follow(places), chosen)
     flock = kernels.Flock(Gains(MU1, MU2, GAINS.spacing, tilt=tilt).settings(limits), law == "ideal")
-    change, told = np.empty((21, 3)), np.empty((4, 21))
-    kernels.rates(leader, state, places, chosen, flock, change, told)
+    change, knowledge = np.empty((21, 3)), np.empty((4, 21))
+    kernels.rates(leader, state, places, chosen, flock, change, knowledge)
     agents = [Pose(*row) for row in state.tolist()]
     motions = [leader]
     for agent in range(1, 21):
@@ -82,7 +82,7 @@ def test_the_compiled_flock_is_that_of_the_laws(seed: int, law: str, most: int, 
         driven, _ = limits.apply(wanted)
         motions.append(driven)
         known = (wanted.v, driven.v, driven.u, shape.rho)
-        np.testing.assert_allclose(told[:, agent], known, rtol=1e-9, atol=1e-10)
+        np.testing.assert_allclose(knowledge[:, agent], known, rtol=1e-9, atol=1e-10)
     velocities = [
         (m.v * math.cos(a.theta), m.v * math.sin(a.theta), m.u) for a, m in zip(agents, motions, strict=True)
     ]

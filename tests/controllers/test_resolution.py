@@ -64,12 +64,14 @@ def test_a_step_that_is_none_is_refused(bad: float) -> None:
 
 
 @given(wanted_motion, st.floats(-0.005, 0.005), st.floats(-0.02, 0.02))
-def test_each_axis_keeps_its_own_steps_and_its_own_debt(wanted: Motion, owed_v: float, owed_u: float) -> None:
+def test_each_axis_keeps_its_own_steps_and_its_own_remainder(
+    wanted: Motion, remainder_v: float, remainder_u: float
+) -> None:
     uneven = Resolution(0.01, 0.04)
-    sent, rest = uneven.round(wanted, Motion(owed_v, owed_u), LIMITS)
+    sent, rest = uneven.round(wanted, Motion(remainder_v, remainder_u), LIMITS)
     for got, left, due, step, bound in (
-        (sent.v, rest.v, wanted.v + owed_v, 0.01, 0.22),
-        (sent.u, rest.u, wanted.u + owed_u, 0.04, 2.84),
+        (sent.v, rest.v, wanted.v + remainder_v, 0.01, 0.22),
+        (sent.u, rest.u, wanted.u + remainder_u, 0.04, 2.84),
     ):
         whole = round(got / step)
         # A hair beyond whole steps, away from zero, so that a link that truncates keeps them.
@@ -80,16 +82,16 @@ def test_each_axis_keeps_its_own_steps_and_its_own_debt(wanted: Motion, owed_v: 
 
 
 def test_one_axis_in_steps_leaves_the_other_alone() -> None:
-    wanted, owed = Motion(0.1234, 1.2345), Motion(0.0, 0.0)
-    sent, rest = Resolution(v=0.01).round(wanted, owed, LIMITS)
+    wanted, remainder = Motion(0.1234, 1.2345), Motion(0.0, 0.0)
+    sent, rest = Resolution(v=0.01).round(wanted, remainder, LIMITS)
     assert (sent.u, rest.u) == (1.2345, 0.0)
     assert rest.v == pytest.approx(0.0034, abs=1e-12)
-    sent, rest = Resolution(u=0.01).round(wanted, owed, LIMITS)
+    sent, rest = Resolution(u=0.01).round(wanted, remainder, LIMITS)
     assert (sent.v, rest.v) == (0.1234, 0.0)
     assert rest.u == pytest.approx(0.0045, abs=1e-12)
 
 
-def test_a_debt_counts_towards_the_next_command_and_half_a_step_is_rounded_up() -> None:
+def test_a_remainder_counts_towards_the_next_command_and_half_a_step_is_rounded_up() -> None:
     steps = Resolution(0.125, 0.25)
     sent, rest = steps.round(Motion(0.0625, -0.125), NO_REMAINDER, Limits(1.0, 1.0))
     assert (sent.v, sent.u) == pytest.approx((0.125, 0.0), abs=1e-6)

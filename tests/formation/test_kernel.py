@@ -190,7 +190,7 @@ def house_of_a_test(folder: Path, top: str) -> Callable[[str], str]:
 
     def run(leaf: str) -> str:
         (package / "leaf_of_a_test.py").write_text(leaf)
-        told = subprocess.run(
+        finished = subprocess.run(
             [sys.executable, "-B", "-m", "formation.top_of_a_test"],
             cwd=folder,
             env=os.environ | {"PYTHONPATH": str(folder)},
@@ -198,7 +198,7 @@ def house_of_a_test(folder: Path, top: str) -> Callable[[str], str]:
             text=True,
             check=True,
         )
-        return told.stdout.strip()
+        return finished.stdout.strip()
 
     return run
 

@@ -11,7 +11,7 @@ from estimation.tracking.tracker import Status
 from formation import pose as plane
 from formation.angles import wrap
 from formation.shape import Shape, follower_pose, shape_of, shape_rates
-from hil.judge.evidence import Evidence, Frames, LogFacts
+from hil.judge.run_data import Frames, LogFacts, RunData
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import Log, read_log
 from hil.scenario.files import load_scenario
@@ -132,7 +132,7 @@ def short_log(tmp_path_factory: pytest.TempPathFactory) -> Log:
 
 
 @pytest.fixture(scope="session")
-def exact_evidence() -> Evidence:
+def exact_run_data() -> RunData:
     """A made-up run of 4 s, judged from 1 s on: a leader on a circle, a follower abreast, no error at all."""
     scenario = load_scenario("turtlebot3", ["run.duration_s=4.0", "run.evaluate_from_s=1.0"])
     shape, leads, follows = (
@@ -152,7 +152,7 @@ def exact_evidence() -> Evidence:
             )
         )
         leader = plane.advance(leader, leads.v, leads.u, FRAME_NS * 1e-9)
-    return Evidence(
+    return RunData(
         scenario=scenario,
         mode="lockstep",
         estimates=[_exact_estimate(each) for each in truth],

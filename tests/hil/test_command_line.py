@@ -12,7 +12,7 @@ import pytest
 
 from hil.command_line import COMMANDS, main
 from hil.errors import UsageError
-from hil.judge.evidence import evidence_of_log
+from hil.judge.run_data import run_data_of_log
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import Log, read_log
 from hil.reports.judged_log import claimed
@@ -123,7 +123,7 @@ def test_a_name_that_is_no_text_is_written_as_far_as_it_is(tmp_path: Path, short
     assert load_scenario(str(mine)).name == "lab?"
     log = tmp_path / os.fsdecode(b"run\xff.mcap")
     log.write_bytes(short_log.path.read_bytes())
-    facts = evidence_of_log(read_log(log)).log
+    facts = run_data_of_log(read_log(log)).log
     assert facts is not None
     assert facts.path == f"{tmp_path}/run?.mcap"
 

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from estimation.bounds.assumptions import Assumptions
 from estimation.bounds.bound_check import SpeedInputs, h_of
 from estimation.bounds.certificate import certify
-from estimation.bounds.premises import Premises
 from formation.invariant_set import Disturbed, InvariantSet, invariant_set
 from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
 from formation.station import Side
 from formation.steering_margin import steering_margin
 
-TURTLEBOT3 = Premises(
+TURTLEBOT3 = Assumptions(
     eps=1.5e-3,
     step=1.0 / 120.0,
     v_eps=0.04,
@@ -108,13 +108,13 @@ UNHELD = replace(TURTLEBOT3, k_u=1.7)
 """A leader that turns too hard for any set."""
 
 
-def held_of(given: Premises, steered: float) -> InvariantSet:
+def held_of(given: Assumptions, steered: float) -> InvariantSet:
     held = invariant_set(Disturbed(given.mu1, given.spacing, given.speeds, steered))
     assert held is not None
     return held
 
 
-def largest_h(given: Premises, error: float, held: InvariantSet) -> tuple[float, float]:
+def largest_h(given: Assumptions, error: float, held: InvariantSet) -> tuple[float, float]:
     """Bounds of h, printed and sound, by hand: a dense maximum over believed states and directions."""
     off = math.asin(error / given.v_eps)
     ends = np.array([held.rho_min, held.rho_max])
@@ -131,7 +131,9 @@ def largest_h(given: Premises, error: float, held: InvariantSet) -> tuple[float,
 
 
 @pytest.mark.parametrize("given", [TURTLEBOT3, QUIET, replace(TURTLEBOT3, k_u=0.3, mu1=0.8, v_eps=0.06)])
-def test_the_bounds_of_h_are_the_dense_maximum_over_what_may_be_believed_in_the_set(given: Premises) -> None:
+def test_the_bounds_of_h_are_the_dense_maximum_over_what_may_be_believed_in_the_set(
+    given: Assumptions,
+) -> None:
     found = certify(given)
     printed, sound = largest_h(given, found.velocity_error, held_of(given, given.k_u))
     assert found.h.figures["sound"] == pytest.approx(sound, rel=2e-3)
@@ -140,7 +142,7 @@ def test_the_bounds_of_h_are_the_dense_maximum_over_what_may_be_believed_in_the_
 
 
 @pytest.mark.parametrize("given", [UNHELD, replace(TURTLEBOT3, unproved="a station not abreast")])
-def test_without_a_set_the_bounds_of_h_are_a_sum_at_the_station(given: Premises) -> None:
+def test_without_a_set_the_bounds_of_h_are_a_sum_at_the_station(given: Assumptions) -> None:
     found = certify(given)
     error, rho_0 = found.velocity_error, given.spacing.rho_0
     half = 0.5 * math.asin(error / given.v_eps)

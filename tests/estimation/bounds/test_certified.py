@@ -36,7 +36,7 @@ def test_the_worst_noise_and_turn_come_to_the_edge() -> None:
         ([0.2, 0.6], moved((0.018, 0.0), (-0.05, 0.0)), Failed.ACCELERATION),
     ],
 )
-def test_it_is_told_which_premise_fails(back: list[float], rows: FloatArray, expected: Failed) -> None:
+def test_it_is_told_which_assumption_fails(back: list[float], rows: FloatArray, expected: Failed) -> None:
     assert certain_motion(np.array(back), rows, np.full(len(back), 2.0 * EPS), A, SPEEDS) is expected
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from estimation.bounds.certified import Failed
 from estimation.bounds.certified_positions import PositionCertifier
-from estimation.bounds.recent import NOTHING_RECENT, Recent
+from estimation.bounds.sample_window import EMPTY_WINDOW, SampleWindow
 from formation.angles import wrap
 
 EPS, K_V, K_U, V_EPS = 1.5e-3, 0.1, 0.7, 0.04
@@ -31,7 +31,7 @@ def test_the_truth_is_always_within_what_is_certain(
     """Leaders that turn as hard as they may, one way and the other, positions as wrong as they may be."""
     random = np.random.default_rng(seed)
     turn, heading, leader = K_U * random.choice([-1.0, 1.0]), random.uniform(-math.pi, math.pi), 0.0 + 0.0j
-    known, told = NOTHING_RECENT, 0
+    known, certified = EMPTY_WINDOW, 0
     dt, drift = STEP_NS * 1e-9, random.uniform(-9.0, 9.0)
     for frame in range(120):
         turn = -turn if frame in switches else turn
@@ -53,14 +53,14 @@ def test_the_truth_is_always_within_what_is_certain(
         if found is Failed.GAP:
             continue
         assert not isinstance(found, Failed)
-        told += 1
+        certified += 1
         assert abs(v1 - found.v1.centre) <= found.v1.half + ROUNDING
         assert abs(wrap(-1.2 - found.alpha1.centre)) <= found.alpha1.half + ROUNDING
-    assert told > 20
+    assert certified > 20
 
 
-def straight(frames: int) -> Recent:
-    known = NOTHING_RECENT
+def straight(frames: int) -> SampleWindow:
+    known = EMPTY_WINDOW
     for frame in range(frames):
         at = (0.08 * frame * STEP_NS * 1e-9, 0.0)
         known = CERTIFIER.add(known, frame * STEP_NS, at, (at[0], -0.2))
@@ -81,14 +81,14 @@ def test_a_straight_leader_is_known_as_well_as_can_be() -> None:
 
 
 def test_nothing_is_certain_of_a_time_without_a_position() -> None:
-    assert CERTIFIER.certain(NOTHING_RECENT, 0) is Failed.UNSEEN
+    assert CERTIFIER.certain(EMPTY_WINDOW, 0) is Failed.UNSEEN
     assert CERTIFIER.certain(straight(50), 50 * STEP_NS) is Failed.UNSEEN
     assert CERTIFIER.certain(straight(1), 0) is Failed.GAP
 
 
 def test_order_of_arrival_does_not_matter() -> None:
     known = straight(60)
-    swapped = NOTHING_RECENT
+    swapped = EMPTY_WINDOW
     for frame in [*range(50), *range(59, 49, -1)]:
         at = (0.08 * frame * STEP_NS * 1e-9, 0.0)
         swapped = CERTIFIER.add(swapped, frame * STEP_NS, at, (at[0], -0.2))

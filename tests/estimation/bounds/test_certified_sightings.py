@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from estimation.bounds.certified import Certain, Failed
 from estimation.bounds.certified_sightings import SightingCertifier, SightingErrors, velocity_error
-from estimation.bounds.recent import NOTHING_RECENT, Recent
+from estimation.bounds.sample_window import EMPTY_WINDOW, SampleWindow
 from estimation.own_motion.odometry_history import History, MotionSample
 from formation.angles import FloatArray, wrap
 
@@ -34,8 +34,8 @@ def path(v: FloatArray, u: FloatArray, heading: float) -> tuple[NDArray[np.compl
 
 def fed(
     odometry: History, sightings: Iterable[tuple[int, float, float]]
-) -> tuple[Recent, list[Certain | Failed]]:
-    known, found = NOTHING_RECENT, []
+) -> tuple[SampleWindow, list[Certain | Failed]]:
+    known, found = EMPTY_WINDOW, []
     for capture_ns, rho, alpha2 in sightings:
         known = CERTIFIER.add(known, capture_ns, rho, alpha2)
         heard = tuple(sample for sample in odometry if sample.stamp_ns <= capture_ns)
@@ -66,11 +66,11 @@ def test_the_truth_is_always_within_what_is_certain(
     line = (leader - follower - 0.25j * np.exp(1j * heading[0]))[::FINE]
     heading, own = heading[::FINE], own[::FINE]
     wrong = np.ones((4, len(ticks))) if edge else random.random((4, len(ticks)))
-    told_v = v2 + signs[0] * wrong[0] * ERRORS.M_v2
-    told_u = u2 + signs[1] * wrong[1] * ERRORS.M_u2
+    odometry_v = v2 + signs[0] * wrong[0] * ERRORS.M_v2
+    odometry_u = u2 + signs[1] * wrong[1] * ERRORS.M_u2
     odometry = tuple(
         MotionSample(EPOCH_NS + tick * STEP_NS, v, u)
-        for tick, v, u in zip(ticks.tolist(), told_v.tolist(), told_u.tolist(), strict=True)
+        for tick, v, u in zip(ticks.tolist(), odometry_v.tolist(), odometry_u.tolist(), strict=True)
     )
     either = random.choice([-1.0, 1.0], (2, len(ticks)))
     rho = np.abs(line) + either[0] * wrong[2] * ERRORS.E_rho
@@ -97,7 +97,7 @@ def test_a_follower_that_swerves_between_rare_samples_takes_nothing_from_certain
     captures = (EPOCH_NS + ticks * STEP_NS).tolist()
     odometry = tuple(map(MotionSample, captures, v2.tolist(), u2.tolist()))
     line = (leader - follower)[:: held * FINE] * np.exp(-1j * own[:: held * FINE])
-    known = NOTHING_RECENT
+    known = EMPTY_WINDOW
     for row, (capture_ns, to_leader) in enumerate(zip(captures, line.tolist(), strict=True)):
         known = certifier.add(known, capture_ns, abs(to_leader), cmath.phase(to_leader))
         certain = certifier.certain(known, odometry[: row + 1], capture_ns)

@@ -151,9 +151,9 @@ def test_cosine_change_is_the_maximum_found_by_search(angle: float, span: float)
 def test_without_input_errors_the_extended_form_is_the_sound_form(
     perceived: Perceived, rates: RateErrors
 ) -> None:
-    expected, told = sound(perceived, rates), sound_form(perceived, rates)
+    expected, found = sound(perceived, rates), sound_form(perceived, rates)
     for name, bound in extended(perceived, rates, InputErrors()).items():
-        assert bound == pytest.approx(float(told[name]), rel=1e-14), name
+        assert bound == pytest.approx(float(found[name]), rel=1e-14), name
         assert bound == pytest.approx(expected[name], rel=1e-9, abs=1e-14), name
 
 

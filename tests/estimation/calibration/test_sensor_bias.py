@@ -43,12 +43,12 @@ def test_offsets_are_found_through_strays_wherever_they_lie(
 
 def test_the_standard_deviations_are_those_of_many_calibrations() -> None:
     generator = np.random.default_rng(5)
-    errors, told = [], []
+    errors, reported_sd = [], []
     for _ in range(300):
         found = find_sensor_bias(*sightings(generator, 80, (0.03, -0.06), 0.1))
         errors.append((found.range.value - 0.03, found.bearing.value + 0.06))
-        told.append((found.range.sd, found.bearing.sd))
-    ratio = np.std(errors, axis=0) / np.sqrt(np.mean(np.square(told), axis=0))
+        reported_sd.append((found.range.sd, found.bearing.sd))
+    ratio = np.std(errors, axis=0) / np.sqrt(np.mean(np.square(reported_sd), axis=0))
     assert ratio.min() > 0.75
     assert ratio.max() < 1.1
 

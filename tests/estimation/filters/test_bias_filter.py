@@ -86,8 +86,8 @@ def test_offsets_are_found_while_the_pair_moves_against_each_other() -> None:
         seen, alpha1 = sightings(weaving, OFFSETS, 50.0, seed)
         with_offsets = tracked(BiasedExtended(MODEL, *PRIOR), seen)
         offsets = offsets_of(with_offsets[-1])
-        assert offsets.range_told
-        assert offsets.bearing_told
+        assert offsets.range_observable
+        assert offsets.bearing_observable
         sd = np.sqrt(np.diag(offsets.covariance))
         assert np.all(sd < 0.5 * np.array(PRIOR))
         assert np.all(np.abs(offsets.mean - OFFSETS) < 3.5 * sd)
@@ -106,8 +106,8 @@ def test_what_a_kept_formation_cannot_tell_stays_unknown_and_is_told_so() -> Non
         seen, alpha1 = sightings(keeping_formation, offsets, 20.0, seed, INSIDE)
         beliefs = tracked(BiasedExtended(MODEL, *PRIOR), seen)
         known = offsets_of(beliefs[-1])
-        assert not known.range_told
-        assert not known.bearing_told
+        assert not known.range_observable
+        assert not known.bearing_observable
         assert np.sqrt(np.diag(known.covariance)) == pytest.approx(PRIOR, rel=0.2)
         error, sd = alpha1_error(beliefs[-1], seen[-1], alpha1[-1])
         assert abs(error) < 3.5 * sd
@@ -133,7 +133,7 @@ def test_the_gate_knows_of_the_offsets() -> None:
         # Sure of the leader, so that only the offsets can explain what is seen.
         begun = estimator.start(seen[0])
         belief = begun._replace(
-            covariance=1e-8 * np.eye(5), memory=replace(offsets_of(begun), cross=np.zeros((5, 2)))
+            covariance=1e-8 * np.eye(5), filter_state=replace(offsets_of(begun), cross=np.zeros((5, 2)))
         )
         prior = estimator.predict(belief, DT, seen[1].motion)
         after, nis = estimator.step(belief, DT, seen[1].motion, far, math.inf)

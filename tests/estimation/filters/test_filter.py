@@ -141,8 +141,8 @@ def test_compiled_and_plain_steps_give_the_same_bits(
     gate = share * nis_of(belief.gaussian, measurement.x, measurement.y, measurement.spread)
     compiled, plain = row_of(belief.gaussian), row_of(belief.gaussian)
     seen_, filters = row_of(measurement), row_of(estimator)
-    told = [each(rows, seen_, filters, dt, gate) for each, rows in ((step, compiled), (_plain, plain))]
-    assert np.array(told[0]).tobytes() == np.array(told[1]).tobytes()
+    results = [each(rows, seen_, filters, dt, gate) for each, rows in ((step, compiled), (_plain, plain))]
+    assert np.array(results[0]).tobytes() == np.array(results[1]).tobytes()
     assert columns_of(compiled).tobytes() == columns_of(plain).tobytes()
 
 

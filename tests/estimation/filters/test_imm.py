@@ -65,7 +65,11 @@ def score(of: Estimator, bandwidth: float, runs: int = 6, steps: int = 480, late
             belief = of.update(prior, seen[k])
             if k >= late:
                 error = belief.mean - truth[k]
-                agile = belief.memory.probabilities[1] if isinstance(belief.memory, Modes) else math.nan
+                agile = (
+                    belief.filter_state.probabilities[1]
+                    if isinstance(belief.filter_state, Modes)
+                    else math.nan
+                )
                 rows.append(
                     (
                         error[2] ** 2 + error[3] ** 2,
@@ -134,8 +138,8 @@ def test_coasting_forgets_the_mode() -> None:
 
 
 def probabilities(belief: Belief) -> tuple[float, ...]:
-    assert isinstance(belief.memory, Modes)
-    return belief.memory.probabilities
+    assert isinstance(belief.filter_state, Modes)
+    return belief.filter_state.probabilities
 
 
 def test_a_belief_of_another_estimator_is_refused() -> None:

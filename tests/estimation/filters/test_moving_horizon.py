@@ -8,8 +8,8 @@ import pytest
 from benchmarks.random_leaders import random_leader
 from estimation.filters.belief import Belief, Model, innovation
 from estimation.filters.estimator import Estimator
+from estimation.filters.filter_states import Horizon
 from estimation.filters.kalman import ExtendedFilter
-from estimation.filters.memory import Horizon
 from estimation.filters.moving_horizon import MovingHorizon
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, Measurement
@@ -91,8 +91,8 @@ def test_the_window_stays_as_long_as_it_is_set() -> None:
     beliefs, _ = followed(MovingHorizon(MODEL, 7), measured(generator, drawn_leader(generator, 30)))
     lengths = []
     for belief in beliefs:
-        assert isinstance(belief.memory, Horizon)
-        lengths.append(len(belief.memory.stages))
+        assert isinstance(belief.filter_state, Horizon)
+        lengths.append(len(belief.filter_state.stages))
     assert lengths == [min(k + 1, 7) for k in range(30)]
 
 

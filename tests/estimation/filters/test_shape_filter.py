@@ -7,8 +7,8 @@ import pytest
 
 from estimation.filters.belief import Belief, Model, innovation
 from estimation.filters.estimator import Estimator
+from estimation.filters.filter_states import Guess, ShapeState
 from estimation.filters.kalman import ExtendedFilter
-from estimation.filters.memory import Guess, ShapeState
 from estimation.filters.shape_filter import ShapeFilter
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import (
@@ -100,11 +100,11 @@ def test_it_waits_for_a_guess_and_gives_it_up_when_the_leader_stops(front_end: F
     of = ShapeFilter(model(front_end))
     seen, _ = easy_drive(front_end, 1, 60, Motion(0.2, 0.0))
     beliefs, _ = followed(of, seen)
-    assert all(isinstance(belief.memory, Guess) for belief in beliefs[:2])
-    assert isinstance(beliefs[-1].memory, ShapeState)
+    assert all(isinstance(belief.filter_state, Guess) for belief in beliefs[:2])
+    assert isinstance(beliefs[-1].filter_state, ShapeState)
     standing, _ = easy_drive(front_end, 2, 240, Motion(0.0, 0.0))
     beliefs, _ = followed(of, standing)
-    assert isinstance(beliefs[-1].memory, Guess) or beliefs[-1].speed < 0.05
+    assert isinstance(beliefs[-1].filter_state, Guess) or beliefs[-1].speed < 0.05
 
 
 def test_a_guess_does_not_average_over_the_time_before_the_leader_set_off() -> None:

@@ -12,7 +12,7 @@ from formation.pose import Pose, advance
 STEP_S = 0.016
 
 
-def told(t: FloatArray, seed: int = 0) -> FloatArray:
+def odometry(t: FloatArray, seed: int = 0) -> FloatArray:
     """Odometry of a robot that changes its mind every second or so."""
     generator = np.random.default_rng(seed)
     moments = np.cumsum(generator.uniform(0.5, 2.0, 100))
@@ -34,9 +34,9 @@ def seen(t: FloatArray, motion: FloatArray, noise: float = 1.0) -> FloatArray:
 
 def aligned(delay: float, scale_v: float, scale_u: float, seed: int = 0, noise: float = 1.0) -> Alignment:
     t = np.arange(0.0, 60.0, STEP_S)
-    motion = told(t - delay, seed) * [scale_v, scale_u]
+    motion = odometry(t - delay, seed) * [scale_v, scale_u]
     late = np.arange(0.003, 60.0, 0.03)
-    return align_odometry(t, seen(t, motion, noise), late, told(late, seed))
+    return align_odometry(t, seen(t, motion, noise), late, odometry(late, seed))
 
 
 @given(
@@ -85,14 +85,14 @@ def test_a_delay_beyond_those_that_are_tried_is_not_made_up() -> None:
 @pytest.mark.parametrize("count", [0, 1, 2, 200])
 def test_of_a_short_span_nothing_is_known(count: int) -> None:
     t = np.arange(float(count)) * STEP_S
-    assert align_odometry(t, seen(t, told(t)).reshape(-1, 3), t, told(t).reshape(-1, 2)) == UNKNOWN
+    assert align_odometry(t, seen(t, odometry(t)).reshape(-1, 3), t, odometry(t).reshape(-1, 2)) == UNKNOWN
 
 
 def test_what_is_not_covered_by_both_is_left_out() -> None:
     t = np.arange(0.0, 60.0, STEP_S)
-    poses = seen(t, told(t - 0.2))
+    poses = seen(t, odometry(t - 0.2))
     poses[(t > 20.0) & (t < 25.0)] += 5.0
     kept = (t < 20.0) | (t > 25.0)
-    found = align_odometry(t[kept], poses[kept], t[t < 50.0], told(t[t < 50.0]))
+    found = align_odometry(t[kept], poses[kept], t[t < 50.0], odometry(t[t < 50.0]))
     assert found.delay is not None
     assert found.delay.value == pytest.approx(0.2, abs=0.02)

@@ -15,12 +15,12 @@ from estimation.own_motion.own_track import (
     OwnNoise,
     OwnPoint,
     folded,
-    foreseen,
     motion_of,
     own_begun,
     own_followed,
     own_place,
     own_point,
+    own_predicted,
 )
 from formation.angles import wrap
 from formation.pose import Pose, advance
@@ -29,7 +29,7 @@ from formation.ring import EMPTY
 
 FRAME_NS = 16_000_000
 NOISE = OwnNoise(PoseNoise(7e-4, 8e-3), v_max=0.2, u_max=0.6)
-UNTOLD = FollowerMotion(0.0, 0.0, 0.0, 0.0)
+NO_ODOMETRY = FollowerMotion(0.0, 0.0, 0.0, 0.0)
 
 
 def driven(count: int, v: float, u: float, seed: int = 1) -> list[Pose]:
@@ -49,7 +49,7 @@ class OwnTrack:
         self.rows, self.ring, self.span = rows_of(OwnPoint, room), EMPTY, span
 
     def fold(self, capture_ns: int, pose: Pose, odometry: FollowerMotion | None = None) -> None:
-        due = own_begun(capture_ns, pose, odometry is not None, odometry or UNTOLD, NOISE)
+        due = own_begun(capture_ns, pose, odometry is not None, odometry or NO_ODOMETRY, NOISE)
         self.ring = folded(self.rows, self.ring, due, NOISE, self.span)
 
     def points(self) -> list[OwnPoint]:
@@ -160,15 +160,15 @@ def test_the_track_keeps_its_span_and_knows_the_moments_of_its_poses() -> None:
 
 
 @pytest.mark.parametrize("k", [0, 1, 5, 59, 60])
-def test_what_a_pose_would_become_is_foreseen_without_putting_it_there(k: int) -> None:
+def test_what_a_pose_would_become_is_predicted_without_putting_it_there(k: int) -> None:
     poses = driven(61, 0.08, 0.2)
     track = OwnTrack()
     for number, pose in enumerate(poses[:60]):
         if number != k:
             track.fold(number * FRAME_NS, pose)
-    due = own_begun(k * FRAME_NS, poses[k], False, UNTOLD, NOISE)
+    due = own_begun(k * FRAME_NS, poses[k], False, NO_ODOMETRY, NOISE)
     before, ring = columns_of(track.rows).tobytes(), track.ring
-    found = foreseen(track.rows, ring, due, NOISE)
+    found = own_predicted(track.rows, ring, due, NOISE)
     assert (columns_of(track.rows).tobytes(), track.ring) == (before, ring)
     if k == 0:
         assert found == due
@@ -177,8 +177,8 @@ def test_what_a_pose_would_become_is_foreseen_without_putting_it_there(k: int) -
     at = own_place(track.rows, track.ring, k * FRAME_NS)
     assert found == own_point(track.rows, track.ring, at)
     # A moment that the track has is told as the track has it, whatever comes with it now.
-    again = own_begun(k * FRAME_NS, Pose(7.0, 7.0, 0.0), False, UNTOLD, NOISE)
-    assert foreseen(track.rows, track.ring, again, NOISE) == found
+    again = own_begun(k * FRAME_NS, Pose(7.0, 7.0, 0.0), False, NO_ODOMETRY, NOISE)
+    assert own_predicted(track.rows, track.ring, again, NOISE) == found
 
 
 def test_more_poses_than_there_is_room_for_shorten_the_track_and_nothing_else() -> None:
@@ -197,15 +197,15 @@ def test_more_poses_than_there_is_room_for_shorten_the_track_and_nothing_else() 
 def test_it_is_a_kalman_filter_on_the_unicycle() -> None:
     """Against matrices: the motion by finite differences, the update in Joseph's form."""
     generator = np.random.default_rng(9)
-    told = FollowerMotion(0.08, 0.4, 0.01, 0.05)
-    point = own_begun(0, Pose(1.0, 2.0, 3.0), False, UNTOLD, NOISE)
+    odometry = FollowerMotion(0.08, 0.4, 0.01, 0.05)
+    point = own_begun(0, Pose(1.0, 2.0, 3.0), False, NO_ODOMETRY, NOISE)
     mean, covariance = np.array(point.state), covariance_of(point)
     for k in range(1, 60):
         pose = advance(Pose(1.0, 2.0, 3.0), 0.08, 0.4, k * 0.016)
         shake = (generator.standard_normal(3) * [7e-4, 7e-4, 8e-3]).tolist()
         seen = Pose(pose.x + shake[0], pose.y + shake[1], float(wrap(pose.theta + shake[2])))
-        point = own_followed(point, own_begun(k * FRAME_NS, seen, True, told, NOISE), NOISE)
-        mean, covariance = by_matrices(mean, covariance, seen, told, 0.016)
+        point = own_followed(point, own_begun(k * FRAME_NS, seen, True, odometry, NOISE), NOISE)
+        mean, covariance = by_matrices(mean, covariance, seen, odometry, 0.016)
         assert point.state[:2] == pytest.approx(mean[:2], abs=1e-9)
         assert abs(wrap(point.state.theta - float(mean[2]))) < 1e-9
         assert point.state[3:] == pytest.approx(mean[3:], abs=1e-8)
@@ -223,7 +223,7 @@ def covariance_of(point: OwnPoint) -> Matrix:
 
 
 def by_matrices(
-    mean: Vector, covariance: Matrix, seen: Pose, told: FollowerMotion, dt: float
+    mean: Vector, covariance: Matrix, seen: Pose, odometry: FollowerMotion, dt: float
 ) -> tuple[Vector, Matrix]:
     def moved(x: Vector) -> Vector:
         pose = advance(Pose(x[0], x[1], 0.0), x[3], x[4], dt)
@@ -238,10 +238,10 @@ def by_matrices(
     turn[2, 0] = turn[4, 1] = 1.0
     noise = 0.04 * drive @ ramp @ drive.T + 0.36 * turn @ ramp @ turn.T
     mean, covariance = moved(mean), move @ covariance @ move.T + noise
-    thinned = 2.0 * 0.05 / dt
+    inflation = 2.0 * 0.05 / dt
     for rows, value, variances in (
         ([0, 1, 2], np.array(seen), np.square([7e-4, 7e-4, 8e-3])),
-        ([3, 4], np.array(told[:2]), thinned * np.square(told[2:])),
+        ([3, 4], np.array(odometry[:2]), inflation * np.square(odometry[2:])),
     ):
         see = np.eye(5)[rows]
         residual = value - see @ mean

@@ -14,7 +14,6 @@ from estimation.filters.estimators import make_estimator
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, PoseNoise, measure_body_from_mocap, measure_world
 from estimation.tracking.estimate import Estimate, Joint, estimate_of
-from estimation.tracking.foresight import NO_TREND, Foresight, TurnTrend
 from estimation.tracking.prediction import (
     Reported,
     SentCommand,
@@ -26,6 +25,7 @@ from estimation.tracking.prediction import (
 from estimation.tracking.track import as_filter
 from estimation.tracking.track_point import NO_JUMP
 from estimation.tracking.tracker import Status
+from estimation.tracking.turn_prediction import NO_TREND, TurnPrediction, TurnTrend
 from formation.angles import FloatArray, wrap
 from formation.kernel import entry, interpreted
 from formation.line import Line, shape_of_line
@@ -76,9 +76,9 @@ def reported(given: Estimate) -> Reported:
 
 @entry
 def predicted_line(
-    told: Reported, rows: Rows[SentCommand], sent: Ring, until_ns: int, lag: float, further: float
+    report: Reported, rows: Rows[SentCommand], sent: Ring, until_ns: int, lag: float, further: float
 ) -> Line:
-    return predicted(sight_of(told), borrowed(rows), sent, until_ns, lag, further)
+    return predicted(sight_of(report), borrowed(rows), sent, until_ns, lag, further)
 
 
 def predict_shape(
@@ -269,7 +269,7 @@ def alpha1_errors(kind: str, front_end: FrontEnd, sigma: float) -> tuple[float, 
     measure = measure_world if front_end is FrontEnd.WORLD else measure_body_from_mocap
     own, noise = FollowerMotion(0.1, 0.2, 2e-3, 1e-2), PoseNoise(sigma, 0.0035)
     of = as_filter(make_estimator(kind, Model(front_end, LIMITS, BY_RULE)))
-    sight = Foresight.of(LIMITS.k_u, BY_RULE.q_u)
+    turn_prediction = TurnPrediction.of(LIMITS.k_u, BY_RULE.q_u)
     pair, ahead, trend = swinging_pair(840), AHEAD * STEP_NS * 1e-9, NO_TREND
     belief, errors = None, []
     for k, (leader, follower) in enumerate(pair[:-AHEAD]):
@@ -278,18 +278,18 @@ def alpha1_errors(kind: str, front_end: FrontEnd, sigma: float) -> tuple[float, 
             of.start(seen) if belief is None else of.update(of.predict(belief, STEP_NS * 1e-9, own), seen)
         )
         found = estimate_of(belief, seen, Status.TRACKING, 1.0, seen.capture_ns, NO_JUMP)
-        trend = heard(sight, trend, found, ahead)
+        trend = heard(turn_prediction, trend, found, ahead)
         if k < 360:
             continue
         until_ns, true = (k + AHEAD) * STEP_NS, shape_of(*pair[k + AHEAD]).alpha1
-        turns = (0.0, sight.further(trend, ahead))
+        turns = (0.0, turn_prediction.further(trend, ahead))
         errors.append([predict_shape(found, [], until_ns, 0.0, turn).alpha1 - true for turn in turns])
     held, carried = np.sqrt(np.mean(wrap(np.array(errors)) ** 2, axis=0))
     return float(held), float(carried)
 
 
-def heard(sight: Foresight, trend: TurnTrend, found: Estimate, ahead: float) -> TurnTrend:
-    return sight.heard(trend, found.capture_ns, found.u1, float(found.covariance[4, 4]), ahead)
+def heard(turn_prediction: TurnPrediction, trend: TurnTrend, found: Estimate, ahead: float) -> TurnTrend:
+    return turn_prediction.heard(trend, found.capture_ns, found.u1, float(found.covariance[4, 4]), ahead)
 
 
 @pytest.mark.parametrize(

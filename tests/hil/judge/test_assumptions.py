@@ -9,8 +9,8 @@ import pytest
 
 from hil.judge.assumptions import judge_assumptions
 from hil.judge.columns import columns_of
-from hil.judge.evidence import Evidence
-from hil.judge.replay_verdict import evidence_of_replay
+from hil.judge.replay_verdict import run_data_of_replay
+from hil.judge.run_data import RunData
 from hil.log.metadata import scenario_of
 from hil.log.reader import read_log
 from hil.recordings.column_map import load_column_map
@@ -23,12 +23,12 @@ from hil.wire.assumed_errors import AssumedErrors
 EXTENDED = ("v1_extended", "alpha1_extended", "h_extended")
 
 
-def judged(evidence: Evidence) -> dict[str, Any]:
-    return judge_assumptions(evidence.scenario, columns_of(evidence))
+def judged(run_data: RunData) -> dict[str, Any]:
+    return judge_assumptions(run_data.scenario, columns_of(run_data))
 
 
-def test_exact_inputs_keep_to_every_assumption(exact_evidence: Evidence) -> None:
-    found = judged(exact_evidence)
+def test_exact_inputs_keep_to_every_assumption(exact_run_data: RunData) -> None:
+    found = judged(exact_run_data)
     assert set(found["input_errors_hold"].values()) == {1.0}
     assert set(found["input_errors_hold"]) == {"E_rho", "E_alpha2", "E_v2", "E_u2", "all"}
     assert {found["assumed"]["holds"][name] for name in EXTENDED} == {1.0}
@@ -36,16 +36,16 @@ def test_exact_inputs_keep_to_every_assumption(exact_evidence: Evidence) -> None
     assert [counts[name] for name in EXTENDED] == [0, 0, 0]
 
 
-def test_samples_whose_inputs_err_too_much_are_set_apart(exact_evidence: Evidence) -> None:
+def test_samples_whose_inputs_err_too_much_are_set_apart(exact_run_data: RunData) -> None:
     """A wild distance breaks the assumption, and so a wild v1 there is no one's fault; elsewhere it is."""
-    assumed = AssumedErrors.of(exact_evidence.scenario).errors(0.2)
-    estimates = list(exact_evidence.estimates)
+    assumed = AssumedErrors.of(exact_run_data.scenario).errors(0.2)
+    estimates = list(exact_run_data.estimates)
     for number in (130, 150):
         estimates[number] = replace(estimates[number], v1=estimates[number].v1 + 1.0)
     estimates[130] = replace(estimates[130], rho=estimates[130].rho + 2.0 * assumed.E_rho)
-    evidence = replace(exact_evidence, estimates=estimates)
-    n = len(columns_of(evidence).samples.capture_ns)
-    found = judged(evidence)
+    run_data = replace(exact_run_data, estimates=estimates)
+    n = len(columns_of(run_data).samples.capture_ns)
+    found = judged(run_data)
     assert found["input_errors_hold"]["E_rho"] == pytest.approx(1.0 - 1.0 / n)
     assert found["input_errors_hold"]["E_v2"] == 1.0
     assert found["assumed"]["holds"]["v1_extended"] == pytest.approx(1.0 - 2.0 / n)
@@ -54,11 +54,11 @@ def test_samples_whose_inputs_err_too_much_are_set_apart(exact_evidence: Evidenc
     assert there["violations"]["v1_extended"] == 1
 
 
-def test_only_inputs_whose_truth_is_known_are_asked(exact_evidence: Evidence) -> None:
-    truth = [replace(each, v2=float("nan"), u2=float("nan")) for each in exact_evidence.truth]
-    found = judged(replace(exact_evidence, truth=truth))
+def test_only_inputs_whose_truth_is_known_are_asked(exact_run_data: RunData) -> None:
+    truth = [replace(each, v2=float("nan"), u2=float("nan")) for each in exact_run_data.truth]
+    found = judged(replace(exact_run_data, truth=truth))
     assert set(found["input_errors_hold"]) == {"E_rho", "E_alpha2", "all"}
-    assert judged(replace(exact_evidence, truth=[])) == {}
+    assert judged(replace(exact_run_data, truth=[])) == {}
 
 
 @pytest.mark.real
@@ -70,7 +70,7 @@ def test_on_a_real_recording_extended_bounds_hold_wherever_their_assumptions_do(
     log = read_log(path)
     scenario = scenario_of(log)
     assert scenario is not None
-    raw = judged(evidence_of_replay(log, replay(log), from_s=2.0))
+    raw = judged(run_data_of_replay(log, replay(log), from_s=2.0))
     assert raw["input_errors_hold"]["E_rho"] < 0.1
     assert raw["assumed"]["holds"]["paper_h"] < 0.95
     offsets = calibrate(log, scenario, to_s=6.6)
@@ -81,7 +81,7 @@ def test_on_a_real_recording_extended_bounds_hold_wherever_their_assumptions_do(
             f"estimator.bearing_bias={offsets.bearing.value}",
         ],
     )
-    found = judged(evidence_of_replay(log, replay(log, corrected), from_s=2.0))
+    found = judged(run_data_of_replay(log, replay(log, corrected), from_s=2.0))
     assert found["input_errors_hold"]["all"] > 0.9
     there = found["assumed"]["where_inputs_hold"]
     assert there["samples"] > 100

@@ -11,8 +11,8 @@ from formation.closed_loop import Trajectory, simulate_pair
 from formation.pose import Motion
 from formation.shape import Shape
 from formation.station import Side
-from hil.judge.evidence import Span
 from hil.judge.noise_free_orbit import noise_free_orbit
+from hil.judge.run_data import Span
 from hil.judge.side_orders import Order
 from hil.judge.true_states import TrueStates
 from hil.scenario.files import load_scenario
@@ -23,7 +23,7 @@ from hil.scenario.start import start_poses
 T0 = 1_700_000_000_000_000_000
 
 
-def told(run: Trajectory) -> tuple[TrueStates, Span]:
+def truth_and_span(run: Trajectory) -> tuple[TrueStates, Span]:
     """The truth of a run as an emulator would have told it."""
     stamps = T0 + np.round(run.t * 1e9).astype(np.int64)
     shape = (run.rho, run.alpha1, run.alpha2, run.rho * np.nan, run.rho * np.nan)
@@ -35,9 +35,9 @@ def told(run: Trajectory) -> tuple[TrueStates, Span]:
 def test_agrees_with_the_accurate_simulation_where_no_limit_is_met(name: str) -> None:
     scenario = load_scenario(name, ["controller.v_max=9.0", "controller.u_max=9.0"])
     run = noise_free_run(scenario, np.linspace(0.0, 8.0, 961))
-    orbit = noise_free_orbit(scenario, *told(run))
+    orbit = noise_free_orbit(scenario, *truth_and_span(run))
     assert orbit is not None
-    rho, alpha1, alpha2 = orbit.at(told(run)[0].capture_ns)
+    rho, alpha1, alpha2 = orbit.at(truth_and_span(run)[0].capture_ns)
     assert np.max(np.abs(rho - run.rho)) < 2e-4 * run.rho.max()
     assert np.max(np.abs(np.sin(alpha1 - run.alpha1))) < 1e-3
     assert np.max(np.abs(np.sin(alpha2 - run.alpha2))) < 1e-3
@@ -57,9 +57,9 @@ def test_a_change_waits_for_the_leader_as_in_the_simulation() -> None:
     assert run.t[behind][0] > 4.5
     assert math.sin(run.alpha1[-1]) > 0.9
     given = Order(T0 + 2_000_000_000, Side.LEFT)
-    orbit = noise_free_orbit(scenario, *told(run), [given])
+    orbit = noise_free_orbit(scenario, *truth_and_span(run), [given])
     assert orbit is not None
-    rho, alpha1, alpha2 = orbit.at(told(run)[0].capture_ns)
+    rho, alpha1, alpha2 = orbit.at(truth_and_span(run)[0].capture_ns)
     assert np.max(np.abs(rho - run.rho)) < 0.02 * scenario.formation.rho_0
     assert np.max(np.abs(np.sin(alpha1 - run.alpha1))) < 0.05
     assert np.max(np.abs(np.sin(alpha2 - run.alpha2))) < 0.05
@@ -76,9 +76,9 @@ def test_keeps_to_the_limits_of_the_controller() -> None:
     times = np.linspace(0.0, 6.0, 721)
     run = simulate_pair(*start_poses(scenario), leader_program(scenario), limited, times)
     assert np.mean(run.v2 == 0.15) > 0.2
-    orbit = noise_free_orbit(scenario, *told(run))
+    orbit = noise_free_orbit(scenario, *truth_and_span(run))
     assert orbit is not None
-    rho, alpha1, alpha2 = orbit.at(told(run)[0].capture_ns)
+    rho, alpha1, alpha2 = orbit.at(truth_and_span(run)[0].capture_ns)
     assert np.max(np.abs(rho - run.rho)) < 2e-4
     assert np.max(np.abs(alpha1 - run.alpha1)) < 1e-3
     assert np.max(np.abs(alpha2 - run.alpha2)) < 1e-3
@@ -86,7 +86,7 @@ def test_keeps_to_the_limits_of_the_controller() -> None:
 
 def test_nothing_to_go_by_gives_no_orbit() -> None:
     scenario = load_scenario("turtlebot3")
-    truth, span = told(noise_free_run(scenario, np.linspace(0.0, 1.0, 61)))
+    truth, span = truth_and_span(noise_free_run(scenario, np.linspace(0.0, 1.0, 61)))
     unknown = replace(truth, v1=np.full(61, math.nan))
     assert noise_free_orbit(scenario, unknown, span) is None
     assert noise_free_orbit(scenario, truth, Span(0, 1)) is None

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from formation.station import Side
-from hil.judge.evidence import evidence_of_link
+from hil.judge.run_data import run_data_of_link
 from hil.judge.side_orders import Order, desired_bearings, orders_of
 from hil.log.metadata import log_metadata
 from hil.log.reader import read_log
@@ -43,5 +43,5 @@ def test_in_a_chain_nobody_is_judged_by_orders(tmp_path: Path) -> None:
         order = encode(String(data="left"))
         out.write(link_topics(link).side, typename_of(String), order, 1, 1)
     log = read_log(tmp_path / "chain.mcap")
-    assert evidence_of_link(log, link).orders == ()
-    assert evidence_of_link(log, replace(link, in_chain=False)).orders == (Order(1, Side.LEFT),)
+    assert run_data_of_link(log, link).orders == ()
+    assert run_data_of_link(log, replace(link, in_chain=False)).orders == (Order(1, Side.LEFT),)

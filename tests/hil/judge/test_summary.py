@@ -11,7 +11,7 @@ import pytest
 from msgspec import structs
 
 from estimation.tracking.tracker import Status
-from hil.judge.evidence import Evidence, evidence_of_log
+from hil.judge.run_data import RunData, run_data_of_log
 from hil.judge.summary import summarise
 from hil.log.metadata import recorded_certificate
 from hil.log.reader import Log
@@ -35,13 +35,13 @@ NAN = math.nan
 
 @pytest.fixture(scope="module")
 def judged(short_log: Log) -> dict[str, Any]:
-    return summarise(evidence_of_log(short_log))
+    return summarise(run_data_of_log(short_log))
 
 
-def without_truth(evidence: Evidence) -> Evidence:
+def without_truth(run_data: RunData) -> RunData:
     """As another lab's recording: nobody knows the truth, nothing drove the robots."""
     return replace(
-        evidence, certificate=None, truth=[], commands=[], motion_since_ns=None, frames=None, refused={}
+        run_data, certificate=None, truth=[], commands=[], motion_since_ns=None, frames=None, refused={}
     )
 
 
@@ -107,8 +107,8 @@ def test_a_short_run_is_as_good_as_it_should_be(judged: dict[str, Any]) -> None:
     assert frames["published"] - frames["received"] == frames["lost"] > 0
 
 
-def test_exact_estimates_have_no_error(exact_evidence: Evidence) -> None:
-    summary = summarise(exact_evidence)
+def test_exact_estimates_have_no_error(exact_run_data: RunData) -> None:
+    summary = summarise(exact_run_data)
     assert all(value < 1e-9 for value in summary["estimation"]["rmse"].values())
     assert set(summary["estimation"]["coverage_3sigma"].values()) == {1.0}
     assert summary["estimation"]["settle_s"] == 0.0
@@ -119,53 +119,53 @@ def test_exact_estimates_have_no_error(exact_evidence: Evidence) -> None:
     assert summary["formation"]["equilibrium_deviation_rms"] == pytest.approx({"rho": 0.0, "alpha1": 0.0})
 
 
-def test_the_equilibrium_is_that_of_the_station(exact_evidence: Evidence) -> None:
-    given = exact_evidence.scenario
+def test_the_equilibrium_is_that_of_the_station(exact_run_data: RunData) -> None:
+    given = exact_run_data.scenario
     elsewhere = structs.replace(given, formation=FormationSection(rho_0=0.17, bearing=1.2))
-    found = summarise(replace(exact_evidence, scenario=elsewhere))["formation"]
+    found = summarise(replace(exact_run_data, scenario=elsewhere))["formation"]
     off = {"rho": 0.03, "alpha1": 0.5 * math.pi - 1.2}
     assert found["equilibrium_deviation_rms"] == pytest.approx(off)
 
 
-def test_latency_is_from_capture_to_the_first_command_on_it(exact_evidence: Evidence) -> None:
+def test_latency_is_from_capture_to_the_first_command_on_it(exact_run_data: RunData) -> None:
     commands = [
         replace(each, capture=to_time(to_ns(each.header.stamp) - 1_000_000 * number), fresh=number % 2 == 1)
-        for number, each in enumerate(exact_evidence.commands)
+        for number, each in enumerate(exact_run_data.commands)
     ]
     waits = np.arange(1.0, 239.0, 2.0)  # the last command comes after the end of the run
-    found = summarise(replace(exact_evidence, commands=commands))["latency_ms"]["capture_to_command"]
+    found = summarise(replace(exact_run_data, commands=commands))["latency_ms"]["capture_to_command"]
     assert found["p50"] == pytest.approx(np.percentile(waits, 50))
     assert found["p99"] == pytest.approx(np.percentile(waits, 99))
     assert found["max"] == 237.0
 
 
-def test_a_capture_estimated_anew_for_a_late_frame_is_no_longer_on_its_way(exact_evidence: Evidence) -> None:
+def test_a_capture_estimated_anew_for_a_late_frame_is_no_longer_on_its_way(exact_run_data: RunData) -> None:
     """The second of two commands on one capture came of a frame from before it: the first had its way."""
-    begun_ns = to_ns(exact_evidence.commands[0].header.stamp)
+    begun_ns = to_ns(exact_run_data.commands[0].header.stamp)
     commands = [
         replace(each, capture=to_time(begun_ns + 20_000_000 * (number // 2) - 5_000_000), fresh=True,
                 header=replace(each.header, stamp=to_time(begun_ns + 10_000_000 * number)))
-        for number, each in enumerate(exact_evidence.commands[:100])
+        for number, each in enumerate(exact_run_data.commands[:100])
     ]  # fmt: skip
-    found = summarise(replace(exact_evidence, commands=commands))["latency_ms"]["capture_to_command"]
+    found = summarise(replace(exact_run_data, commands=commands))["latency_ms"]["capture_to_command"]
     assert found == pytest.approx({"p50": 5.0, "p99": 5.0, "max": 5.0})
 
 
-def test_commands_after_the_stop_do_not_count(exact_evidence: Evidence) -> None:
-    middle = to_ns(exact_evidence.commands[100].header.stamp)
+def test_commands_after_the_stop_do_not_count(exact_run_data: RunData) -> None:
+    middle = to_ns(exact_run_data.commands[100].header.stamp)
     commands = [
         replace(each, saturated=number < 30, stop="stale" if 10 <= number < 15 else "")
-        for number, each in enumerate(exact_evidence.commands)
+        for number, each in enumerate(exact_run_data.commands)
     ]
-    found = summarise(replace(exact_evidence, commands=commands, stopped_ns=middle))
+    found = summarise(replace(exact_run_data, commands=commands, stopped_ns=middle))
     assert found["commands"] == {"sent": 100, "saturated": 30, "stopped": 5}
 
 
-def test_frames_add_up(exact_evidence: Evidence) -> None:
-    assert exact_evidence.frames is not None
-    frames = replace(exact_evidence.frames, published=250)
+def test_frames_add_up(exact_run_data: RunData) -> None:
+    assert exact_run_data.frames is not None
+    frames = replace(exact_run_data.frames, published=250)
     refused = {"gated": 1, "not_finite": 3, "unknown_body": 241}
-    found = summarise(replace(exact_evidence, frames=frames, refused=refused))
+    found = summarise(replace(exact_run_data, frames=frames, refused=refused))
     assert found["rejected"] == refused
     assert found["frames"] == {
         "published": 250,
@@ -177,8 +177,8 @@ def test_frames_add_up(exact_evidence: Evidence) -> None:
     }
 
 
-def test_what_nobody_knows_is_absent(exact_evidence: Evidence) -> None:
-    summary = summarise(without_truth(exact_evidence))
+def test_what_nobody_knows_is_absent(exact_run_data: RunData) -> None:
+    summary = summarise(without_truth(exact_run_data))
     assert set(summary) == {
         *("scenario", "mode", "estimator", "duration_s", "frames", "estimation", "bounds", "log"),
         "certificate",
@@ -192,10 +192,10 @@ def test_what_nobody_knows_is_absent(exact_evidence: Evidence) -> None:
 
 
 def test_a_recording_that_knows_poses_only_is_judged_on_what_follows_from_them(
-    exact_evidence: Evidence,
+    exact_run_data: RunData,
 ) -> None:
-    poses = [replace(each, v1=NAN, u1=NAN, v2=NAN, u2=NAN) for each in exact_evidence.truth]
-    summary = summarise(replace(exact_evidence, truth=poses, motion_since_ns=None))
+    poses = [replace(each, v1=NAN, u1=NAN, v2=NAN, u2=NAN) for each in exact_run_data.truth]
+    summary = summarise(replace(exact_run_data, truth=poses, motion_since_ns=None))
     assert set(summary["estimation"]["rmse"]) == {"alpha1"}
     assert "efficiency" not in summary["estimation"]
     assert summary["bounds"]["checked"] == 0
@@ -203,23 +203,23 @@ def test_a_recording_that_knows_poses_only_is_judged_on_what_follows_from_them(
     assert summary["formation"]["rho_max"] == pytest.approx(0.2)
 
 
-def test_only_what_says_tracking_is_judged(exact_evidence: Evidence) -> None:
+def test_only_what_says_tracking_is_judged(exact_run_data: RunData) -> None:
     wild = [
         replace(each, status=int(Status.COASTING), v1=9.0) if 100 <= number < 110 else each
-        for number, each in enumerate(exact_evidence.estimates)
+        for number, each in enumerate(exact_run_data.estimates)
     ]
     late = [replace(each, status=int(Status.INITIALISING)) for each in wild[:30]]
-    found = summarise(replace(exact_evidence, estimates=late + wild[30:]))["estimation"]
+    found = summarise(replace(exact_run_data, estimates=late + wild[30:]))["estimation"]
     assert found["untracked"] == 10
     assert found["max"]["v1"] < 1e-9
     assert found["settle_s"] == pytest.approx(0.5, abs=1e-6)
 
 
-def test_no_estimates_at_all_still_give_a_summary(exact_evidence: Evidence) -> None:
-    summary = summarise(replace(exact_evidence, estimates=[]))
+def test_no_estimates_at_all_still_give_a_summary(exact_run_data: RunData) -> None:
+    summary = summarise(replace(exact_run_data, estimates=[]))
     assert summary["estimation"] == {"evaluated_from_s": pytest.approx(1.0), "samples": 0, "untracked": 0}
     assert summary["bounds"]["checked"] == 0
-    assert summarise(replace(without_truth(exact_evidence), estimates=[]))["duration_s"] == 0.0
+    assert summarise(replace(without_truth(exact_run_data), estimates=[]))["duration_s"] == 0.0
 
 
 def test_judging_needs_no_pictures() -> None:
@@ -233,7 +233,7 @@ def test_a_run_carries_its_certificate_as_its_log_does(judged: dict[str, Any], s
     assert found["rho_min"] < found["rho_max"]
 
 
-def test_a_recorded_leader_is_certified_by_its_limits_alone(exact_evidence: Evidence) -> None:
-    found = summarise(without_truth(exact_evidence))["certificate"]
+def test_a_recorded_leader_is_certified_by_its_limits_alone(exact_run_data: RunData) -> None:
+    found = summarise(without_truth(exact_run_data))["certificate"]
     assert "v1 anywhere between 0.04 and 0.1 m/s" in found["formation"]["assumes"]
     assert "constant speed" in found["k_u_star"]["why"]

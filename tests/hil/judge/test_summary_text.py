@@ -8,15 +8,15 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from hil.judge.evidence import Evidence
+from hil.judge.run_data import RunData
 from hil.judge.summary import summarise
 from hil.judge.summary_text import print_summary, warnings_of
 from hil.scenario.files import with_overrides
 
 
 @pytest.fixture
-def summary(exact_evidence: Evidence) -> dict[str, Any]:
-    found = copy.deepcopy(summarise(exact_evidence))
+def summary(exact_run_data: RunData) -> dict[str, Any]:
+    found = copy.deepcopy(summarise(exact_run_data))
     del found["rejected"]
     return found
 
@@ -43,9 +43,9 @@ CERTIFIED: dict[str, Any] = {
 }
 
 
-def test_orders_that_are_refused_are_told(exact_evidence: Evidence) -> None:
-    ordered = with_overrides(exact_evidence.scenario, ["formation.change_sides_at_s=[1.0]"])
-    summary = summarise(replace(exact_evidence, scenario=ordered))
+def test_orders_that_are_refused_are_told(exact_run_data: RunData) -> None:
+    ordered = with_overrides(exact_run_data.scenario, ["formation.change_sides_at_s=[1.0]"])
+    summary = summarise(replace(exact_run_data, scenario=ordered))
     assert [warning for warning in warnings_of(summary) if "unsafe_side_change" in warning]
 
 
@@ -99,8 +99,8 @@ def test_a_replay_tells_its_parity(summary: dict[str, Any]) -> None:
     assert "150 messages compared, 2 differ" in printed(summary)
 
 
-def test_a_recording_without_truth_has_little_to_tell(exact_evidence: Evidence) -> None:
-    bare = Evidence(exact_evidence.scenario, "replay", [])
+def test_a_recording_without_truth_has_little_to_tell(exact_run_data: RunData) -> None:
+    bare = RunData(exact_run_data.scenario, "replay", [])
     text = printed(summarise(bare))
     assert "turtlebot3, replay, 0.0 s (ekf)" in text
     assert "nothing to judge" in text

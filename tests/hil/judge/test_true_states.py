@@ -38,9 +38,9 @@ def test_a_heading_between_two_turns_the_short_way(theta: float, turn: float, sh
 
 
 def test_a_moment_with_a_truth_gets_that_truth_bit_for_bit() -> None:
-    told = [truth(T0 + k * STEP, theta=0.1 * k) for k in range(5)]
-    states = TrueStates.of(told)
-    same = at(states, *(to_ns(each.header.stamp) for each in told))
+    truths = [truth(T0 + k * STEP, theta=0.1 * k) for k in range(5)]
+    states = TrueStates.of(truths)
+    same = at(states, *(to_ns(each.header.stamp) for each in truths))
     for name in ("leader", "follower", "v1", "rho", "alpha1", "alpha2", "rho_dot", "alpha2_dot"):
         np.testing.assert_array_equal(getattr(same, name), getattr(states, name))
 

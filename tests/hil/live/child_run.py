@@ -79,8 +79,10 @@ class Run:
             while (event := wire.inbox.take(0.0)) is not None:
                 for status in decode_as(event.payload, msg.DiagnosticArray).status:
                     if status.name == "abreast/estimator":
-                        told = {each.key: each.value for each in status.values}
-                        if all(told.get(f"refused.{cause}") == str(count) for cause, count in counts.items()):
+                        values = {each.key: each.value for each in status.values}
+                        if all(
+                            values.get(f"refused.{cause}") == str(count) for cause, count in counts.items()
+                        ):
                             return True
             return False
 

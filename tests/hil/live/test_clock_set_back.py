@@ -88,17 +88,17 @@ class Lab:
 
     def _stamped(self, message: Outgoing) -> bytes:
         """Payload with the stamp that the host's clock gives it."""
-        told: msg.RigidBodies | msg.Odometry
+        received: msg.RigidBodies | msg.Odometry
         if message.topic == topics.RIGID_BODIES and self.mocap_too:
-            told = decode_as(message.payload, msg.RigidBodies)
+            received = decode_as(message.payload, msg.RigidBodies)
         elif message.topic == ODOM:
-            told = decode_as(message.payload, msg.Odometry)
+            received = decode_as(message.payload, msg.Odometry)
         else:
             return message.payload
-        capture_ns = to_ns(told.header.stamp)
+        capture_ns = to_ns(received.header.stamp)
         if capture_ns < EPOCH_NS + BACK_NS:
             return message.payload
-        return encode(replace(told, header=header(capture_ns - HOUR_NS, told.header.frame_id)))
+        return encode(replace(received, header=header(capture_ns - HOUR_NS, received.header.frame_id)))
 
 
 @contextmanager

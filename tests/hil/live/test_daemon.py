@@ -82,12 +82,12 @@ def test_daemons_started_by_hand_find_each_other_and_end_when_told(tmp_path: Pat
 def lost_something(log: Log, scenario: Scenario) -> bool:
     """Whether something is on no receipt. On a machine that freezes Zenoh may drop what it was taken with."""
     names = topics_of(scenario)
-    journals = {
+    recorded_outputs = {
         topics.RIGID_BODIES: recorded_estimates(log, names.estimate),
         names.estimate: recorded_commands(log, names.command),
     }
-    for topic, journal in journals.items():
-        taken = {name for output in journal for name, _ in output.consumed}
+    for topic, outputs in recorded_outputs.items():
+        taken = {name for output in outputs for name, _ in output.consumed}
         arrived = [digest(topic, record.payload) for record in log.records([topic])]
         last = max(place for place, name in enumerate(arrived) if name in taken)
         if not taken.issuperset(arrived[:last]):

@@ -66,8 +66,8 @@ def last_truth(log: Path, topic: str = topics.TRUTH) -> msg.Truth:
 
 def commands(log: Path, topic: str = COMMAND) -> list[tuple[float, msg.Command]]:
     """Commands with when they were given [s]."""
-    told = [decode_as(record.payload, msg.Command) for record in read_log(log).records([topic])]
-    return [(to_ns(each.header.stamp) * 1e-9, each) for each in told]
+    decoded = [decode_as(record.payload, msg.Command) for record in read_log(log).records([topic])]
+    return [(to_ns(each.header.stamp) * 1e-9, each) for each in decoded]
 
 
 def few_frames_lost(summary: dict[str, Any]) -> bool:
@@ -116,11 +116,11 @@ def test_a_killed_estimator_fails_the_run_and_stops_every_follower(start: Callab
     assert run.daemons() == {}
     assert [pair["follower"] for pair in summary["pairs"]] == list(followers)
     for name in followers:
-        told = commands(run.log, f"{name}/command")
-        assert any(sent.v2 > 0.02 for at, sent in told if at < killed_at)
-        late = [sent for at, sent in told if at > killed_at + 0.3]
-        assert all(sent.v2 == sent.u2 == 0.0 and sent.stop for sent in [*late, told[-1][1]])
-        assert told[-1][0] > killed_at
+        sent_commands = commands(run.log, f"{name}/command")
+        assert any(sent.v2 > 0.02 for at, sent in sent_commands if at < killed_at)
+        late = [sent for at, sent in sent_commands if at > killed_at + 0.3]
+        assert all(sent.v2 == sent.u2 == 0.0 and sent.stop for sent in [*late, sent_commands[-1][1]])
+        assert sent_commands[-1][0] > killed_at
         moving = last_truth(run.log, f"{name}/truth")
         assert max(abs(moving.v1), abs(moving.v2)) < STILL_V
 

@@ -9,7 +9,7 @@ import pytest
 
 from hil.live import run
 from hil.live.run import STANDSTILL_TIMEOUT, _Supervisor
-from hil.live.watch import Picture
+from hil.live.run_monitor import Snapshot
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -38,9 +38,9 @@ class Lab:
     def publish(self, topic: str, payload: bytes) -> None:
         self.sent.append((topic, payload))
 
-    def look(self) -> Picture:
+    def update(self) -> Snapshot:
         moving = SimpleNamespace(v1=0.0, u1=0.0, v2=0.1 if self.now < self._coasts else 0.0, u2=0.0)
-        return Picture((PAIR.follower,), truths={PAIR.follower: moving} if self._seen else {})  # type: ignore[dict-item]
+        return Snapshot((PAIR.follower,), truths={PAIR.follower: moving} if self._seen else {})  # type: ignore[dict-item]
 
     def running(self, name: str) -> bool:
         assert name == "emulator"
@@ -52,7 +52,7 @@ def stopped(monkeypatch: pytest.MonkeyPatch) -> Callable[[Lab], float]:
     def stop(lab: Lab) -> float:
         monkeypatch.setattr(run, "time", lab)
         supervisor = object.__new__(_Supervisor)
-        supervisor.__dict__.update(_wire=lab, _watch=lab, _children=lab, _pairs=[PAIR])
+        supervisor.__dict__.update(_wire=lab, _monitor=lab, _children=lab, _pairs=[PAIR])
         supervisor._stop("enough")
         return lab.now
 

@@ -13,12 +13,12 @@ import pytest
 
 from hil.command_line import main
 from hil.judge.chain_summary import summarise_chain
-from hil.judge.evidence import evidence_of_link
+from hil.judge.run_data import run_data_of_link
 from hil.lockstep.run import run_lockstep
 from hil.log.events import Timed, logged_events
 from hil.log.reader import read_log
 from hil.nodes.link_nodes import estimator_node
-from hil.replay.journal import feed
+from hil.replay.re_execution import execute
 from hil.replay.rerun import replay_chain
 from hil.scenario.files import load_scenario
 from hil.scenario.links import links_of
@@ -126,7 +126,7 @@ def test_a_follower_sees_its_predecessor_and_nobody_else(folder: Path) -> None:
     events = list(logged_events(log, node.subscribes))[:600]
 
     def estimates(timed: Iterable[Timed]) -> list[tuple[float, ...]]:
-        sent = [message for message in feed(node, timed).outputs if message.topic == node.topics.estimate]
+        sent = [message for message in execute(node, timed).outputs if message.topic == node.topics.estimate]
         told = [decode_as(message.payload, LeaderEstimate) for message in sent]
         return [(each.rho, each.alpha2, each.v1, each.alpha1, each.u1) for each in told]
 
@@ -153,7 +153,7 @@ def test_a_chain_away_from_its_stations_is_said_to_be(folder: Path) -> None:
     links = links_of(scenario)
     far = summarise_chain(
         load_scenario("chain5-turtlebot3", [*GIVEN, "formation.rho_0=0.3"]),
-        [evidence_of_link(log, link) for link in links],
+        [run_data_of_link(log, link) for link in links],
     )
     assert far["recovered"] is False
     assert all("settle_s" not in pair for pair in far["pairs"])

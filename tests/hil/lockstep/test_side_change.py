@@ -10,7 +10,7 @@ import pytest
 
 from formation.station import Side
 from hil.errors import UsageError
-from hil.judge.evidence import evidence_of_log
+from hil.judge.run_data import run_data_of_log
 from hil.judge.summary import summarise
 from hil.judge.true_states import TrueStates
 from hil.lockstep.lockstep import EPOCH_NS
@@ -67,13 +67,13 @@ def test_a_driven_pair_changes_sides_as_without_noise_and_replays_bit_for_bit(tm
     times = ["run.duration_s=17.0", "run.evaluate_from_s=14.5", "formation.change_sides_at_s=[1.0, 2.0, 3.0]"]
     run_lockstep(load_scenario("changing-sides", times), tmp_path / "run.mcap")
     log = read_log(tmp_path / "run.mcap")
-    evidence = evidence_of_log(log)
-    assert [each.side for each in evidence.orders] == [Side.LEFT, Side.RIGHT, Side.LEFT]
-    truth = TrueStates.of(evidence.truth)
+    run_data = run_data_of_log(log)
+    assert [each.side for each in run_data.orders] == [Side.LEFT, Side.RIGHT, Side.LEFT]
+    truth = TrueStates.of(run_data.truth)
     assert np.min(truth.rho) > 0.7 * GENTLE.formation.rho_0
     assert truth.alpha1[-1] == pytest.approx(0.5 * math.pi, abs=0.5)
     assert truth.alpha2[-1] == pytest.approx(-0.5 * math.pi, abs=0.1)
-    off = summarise(evidence)["formation"]["orbit_deviation_rms"]
+    off = summarise(run_data)["formation"]["orbit_deviation_rms"]
     assert off["rho"] < 0.04 * GENTLE.formation.rho_0
     assert off["alpha1"] < math.radians(3.0)
     again = replay(log)

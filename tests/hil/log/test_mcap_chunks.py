@@ -88,8 +88,8 @@ def test_statistics_count_what_is_there(folder: Path, messages: list[tuple[str, 
     opened = [record for chunk in of(Chunk, records) for record in breakup_chunk(chunk, validate_crc=True)]
     found = of(Message, opened)
     times = [message.log_time for message in found]
-    (told,) = of(Statistics, records)
-    assert told == Statistics(
+    (statistics,) = of(Statistics, records)
+    assert statistics == Statistics(
         attachment_count=len(of(Attachment, records)),
         channel_count=len(of(Channel, opened)),
         channel_message_counts=dict(Counter(message.channel_id for message in found)),
@@ -111,9 +111,9 @@ def test_indexes_lead_to_each_chunk_and_message(folder: Path, messages: list[tup
     content = written(folder / "b.mcap", messages)
     records = list(spans(content))
     chunks = [place for place, record in enumerate(records) if record[0] == Opcode.CHUNK]
-    told = of(ChunkIndex, read(content))
-    assert [index.chunk_start_offset for index in told] == [records[place][1] for place in chunks]
-    for place, index in zip(chunks, told, strict=True):
+    indexes = of(ChunkIndex, read(content))
+    assert [index.chunk_start_offset for index in indexes] == [records[place][1] for place in chunks]
+    for place, index in zip(chunks, indexes, strict=True):
         _, begin, end = records[place]
         chunk = Chunk.read(ReadDataStream(BytesIO(content[begin + 9 : end])))
         assert (index.chunk_length, index.compression) == (end - begin, chunk.compression)
@@ -154,13 +154,13 @@ def test_the_summary_is_where_the_footer_and_its_offsets_say(
 ) -> None:
     content = written(folder / "c.mcap", messages)
     records = list(spans(content))
-    told = read(content)
-    (footer,) = of(Footer, told)
+    parsed = read(content)
+    (footer,) = of(Footer, parsed)
     (end,) = [until for opcode, _, until in records if opcode == Opcode.DATA_END]
     assert footer.summary_start == end
     crc_at = records[-1][2] - 4
     assert footer.summary_crc == zlib.crc32(content[footer.summary_start : crc_at])
-    offsets = of(SummaryOffset, told)
+    offsets = of(SummaryOffset, parsed)
     first_offset = next(begin for opcode, begin, _ in records if opcode == Opcode.SUMMARY_OFFSET)
     assert footer.summary_offset_start == first_offset
     at = footer.summary_start
@@ -180,9 +180,9 @@ def test_the_summary_is_where_the_footer_and_its_offsets_say(
 
 def test_metadata_is_found_by_its_index(folder: Path) -> None:
     content = written(folder / "d.mcap", [("a", number, b"") for number in range(30)])
-    told = of(MetadataIndex, read(content))
-    assert [index.name for index in told] == ["first", "between", "last"]
-    for index in told:
+    indexes = of(MetadataIndex, read(content))
+    assert [index.name for index in indexes] == ["first", "between", "last"]
+    for index in indexes:
         begin = index.offset
         assert (Opcode.METADATA, begin, begin + index.length) in list(spans(content))
         assert Metadata.read(ReadDataStream(BytesIO(content[begin + 9 :]))).name == index.name

@@ -252,7 +252,15 @@ def test_copies_step_to_the_same_bytes_and_leave_what_they_are_copies_of_alone(k
 
     def known() -> tuple[object, ...]:
         memory = warm.memory
-        return memory.track, memory.history, memory.known, warm.watch, warm.receipts, warm.taken, warm.refused
+        return (
+            memory.track,
+            memory.history,
+            memory.known,
+            warm.comparison,
+            warm.receipts,
+            warm.taken,
+            warm.refused,
+        )
 
     before, since_ns = known(), 57 * FRAME_NS + FRAME_NS // 2
     new = frame(60, PAIR)[1]

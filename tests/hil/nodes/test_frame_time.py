@@ -10,7 +10,7 @@ from estimation.tracking.tracker import Status
 from formation.pose import Motion, Pose, advance
 from hil.emulator.lab_messages import frame_message, odometry_message
 from hil.errors import UsageError
-from hil.judge.evidence import evidence_of_log
+from hil.judge.run_data import run_data_of_log
 from hil.judge.summary import summarise
 from hil.lockstep.lockstep import EPOCH_NS
 from hil.lockstep.run import run_lockstep
@@ -115,7 +115,7 @@ def off_log(tmp_path_factory: pytest.TempPathFactory) -> Log:
 
 
 def test_a_run_with_a_clock_of_its_own_is_as_good_as_one_without(short_log: Log, off_log: Log) -> None:
-    plain, off = (summarise(evidence_of_log(log)) for log in (short_log, off_log))
+    plain, off = (summarise(run_data_of_log(log)) for log in (short_log, off_log))
     for name in ("v1", "alpha1"):
         assert off["estimation"]["rmse"][name] < 1.1 * plain["estimation"]["rmse"][name]
         assert off["estimation"]["efficiency"][name] < 1.1 * plain["estimation"]["efficiency"][name]

@@ -58,7 +58,7 @@ def test_odometry_that_is_late_and_short_is_put_right(source: str) -> None:
     given = ["estimator.align_odometry=true", f"estimator.own_motion={source}"]
     node = EstimatorNode(load_scenario("turtlebot3", given))
     state, found = lived(node, 420, scale=0.9, late=LATE)
-    applied = state.watch.applied
+    applied = state.comparison.applied
     # The wheels keep their motion for a step, of which odometry tells at its begin.
     assert applied.delay == pytest.approx(-(LATE - 0.5) * STEP_NS * 1e-9, abs=0.01)
     assert (applied.scale_v, applied.scale_u) == pytest.approx((1 / 0.9, 1 / 0.9), abs=0.02)
@@ -78,9 +78,9 @@ def test_good_odometry_is_left_alone_and_nothing_is_done_unasked() -> None:
     plain = EstimatorNode(load_scenario("turtlebot3"))
     state, found = lived(asked, 300, scale=1.0, late=0)
     untouched, expected = lived(plain, 300, scale=1.0, late=0)
-    assert state.watch.found.delay is not None
-    assert state.watch.applied == IDEAL
-    assert untouched.watch.poses == ()
+    assert state.comparison.found.delay is not None
+    assert state.comparison.applied == IDEAL
+    assert untouched.comparison.poses == ()
     assert [each.v1 for each in found] == [each.v1 for each in expected]
 
 

@@ -10,7 +10,7 @@ import pytest
 from formation.pose import Pose, advance
 from hil.command_line import main
 from hil.errors import UsageError
-from hil.judge.replay_verdict import evidence_of_replay
+from hil.judge.replay_verdict import run_data_of_replay
 from hil.judge.summary import summarise
 from hil.log.metadata import mode_of, scenario_of
 from hil.log.reader import Log, read_log
@@ -107,7 +107,7 @@ def test_the_truth_knows_the_motion_and_says_where_it_does_not(log: Log) -> None
 
 def test_a_replay_of_the_log_finds_the_leader(log: Log) -> None:
     played = replay(log)
-    summary = summarise(evidence_of_replay(log, played))
+    summary = summarise(run_data_of_replay(log, played))
     assert summary["estimation"]["rmse"]["v1"] < 0.005
     assert summary["estimation"]["rmse"]["alpha1"] < 0.1
     assert summary["rejected"] == {"missing_leader": 22}
@@ -150,7 +150,7 @@ def test_a_real_leader_is_followed_and_commands_are_seen_to_run_ahead(tmp_path: 
     import_mrclam(first_minute(tmp_path / "mrclam6", 1, 2), 1, 2, tmp_path / "real.mcap")
     log = read_log(tmp_path / "real.mcap")
     scenario = with_overrides(scenario_of(log) or load_scenario("mrclam"), ["estimator.own_motion=mocap"])
-    estimation = summarise(evidence_of_replay(log, replay(log, scenario)))["estimation"]
+    estimation = summarise(run_data_of_replay(log, replay(log, scenario)))["estimation"]
     assert estimation["samples"] > 3000
     assert estimation["rmse"]["v1"] <= 0.014
     assert estimation["coverage_3sigma"]["v1"] >= 0.95

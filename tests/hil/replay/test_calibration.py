@@ -12,7 +12,7 @@ from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
 from formation.shape import shape_of
 from hil.errors import UsageError
-from hil.judge.replay_verdict import evidence_of_replay
+from hil.judge.replay_verdict import run_data_of_replay
 from hil.judge.summary import summarise
 from hil.log.metadata import scenario_of
 from hil.log.reader import Log, read_log
@@ -90,7 +90,7 @@ def alpha1_rmse(log: Log, scenario: Scenario, found: SensorBias | None) -> float
     if found is not None:
         offsets = {"range_bias": found.range.value, "bearing_bias": found.bearing.value}
         scenario = with_overrides(scenario, [f"estimator.{name}={value}" for name, value in offsets.items()])
-    judged = summarise(evidence_of_replay(log, replay(log, scenario)))["estimation"]
+    judged = summarise(run_data_of_replay(log, replay(log, scenario)))["estimation"]
     rmse: float = judged["rmse"]["alpha1"]
     return rmse
 

@@ -42,13 +42,13 @@ def logged(path: Path, *, moves: bool = True, mocap: bool = True) -> Log:
 
         for k in range(1900):
             at_ns, shake = START_NS + k * STEP_NS, generator.normal(size=3) * [7e-4, 7e-4, 8e-3]
-            told = command(k) if moves else Motion(0.0, 0.0)
-            write("follower/odom", odometry_message(at_ns, "follower", Pose(0.0, 0.0, 0.0), told), at_ns)
+            sample = command(k) if moves else Motion(0.0, 0.0)
+            write("follower/odom", odometry_message(at_ns, "follower", Pose(0.0, 0.0, 0.0), sample), at_ns)
             if mocap:
                 seen = Pose(follower.x + shake[0], follower.y + shake[1], follower.theta + shake[2])
                 pair = [("leader", leader), ("follower", seen)]
                 write(topics.RIGID_BODIES, frame_message(at_ns, k, pair), at_ns)
-            done = command(k - 13) if moves else told
+            done = command(k - 13) if moves else sample
             follower = advance(follower, 0.9 * done.v, 0.9 * done.u, STEP_NS * 1e-9)
         write("follower/odom", odometry_message(0, "follower", leader, Motion(math.nan, 0.0)), at_ns)
     return read_log(path)

@@ -15,7 +15,7 @@ from hil.lockstep.run import run_lockstep
 from hil.log.metadata import log_metadata, scenario_of
 from hil.log.reader import Log, Record, read_log
 from hil.log.writer import LogWriter
-from hil.replay.journal import Parity
+from hil.replay.re_execution import Parity
 from hil.replay.rerun import Replay, replay
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario, with_overrides

@@ -11,7 +11,7 @@ from estimation.tracking.tracker import Status
 from hil.commands import run
 from hil.commands.replay import command as replay_command
 from hil.errors import UsageError
-from hil.judge.replay_verdict import evidence_of_replay
+from hil.judge.replay_verdict import run_data_of_replay
 from hil.judge.summary import summarise
 from hil.lockstep.run import run_lockstep
 from hil.log.metadata import scenario_of
@@ -45,7 +45,7 @@ def smoothed(rough_log: Log) -> Replay:
 
 
 def rmse(log: Log, played: Replay) -> dict[str, float]:
-    found: dict[str, float] = summarise(evidence_of_replay(log, played, 2.0, 5.5))["estimation"]["rmse"]
+    found: dict[str, float] = summarise(run_data_of_replay(log, played, 2.0, 5.5))["estimation"]["rmse"]
     return found
 
 

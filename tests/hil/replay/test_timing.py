@@ -65,9 +65,9 @@ def test_a_short_run_with_wrong_timing_tells_the_right_one(
     assert found["delay_s_sd"] < 0.002
     settings = found["settings"]
     assert settings["controller.lag_s"] + settings["controller.transport_s"] == pytest.approx(0.1, abs=3e-3)
-    told = " ".join(f"--set {key}={value:.4f}" for key, value in settings.items())
-    assert f"run next with: {told}\n" in err
-    assert "--set estimator.stamp_offset_s=0.0" in told
+    options = " ".join(f"--set {key}={value:.4f}" for key, value in settings.items())
+    assert f"run next with: {options}\n" in err
+    assert "--set estimator.stamp_offset_s=0.0" in options
 
 
 def test_a_run_with_an_offset_is_replayed_bit_for_bit(run_log: Path) -> None:

@@ -46,5 +46,5 @@ def open_page(browser: Chrome, path: Path, width: int) -> Seen:
     WebDriverWait(browser, PATIENCE, poll_frequency=0.1).until(lambda b: b.execute_script(_DRAWN))
     seen = browser.execute_script(_SEEN)
     log = browser.execute("getLog", {"type": "browser"})["value"]
-    told = [str(entry["message"]) for entry in log if entry["level"] != "INFO"]
-    return Seen(errors=told, **seen)
+    messages = [str(entry["message"]) for entry in log if entry["level"] != "INFO"]
+    return Seen(errors=messages, **seen)

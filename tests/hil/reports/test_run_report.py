@@ -15,8 +15,8 @@ import pytest
 from selenium.webdriver import Chrome
 
 from estimation.tracking.tracker import Status
-from hil.figures.shown import Shown
-from hil.judge.evidence import Evidence, evidence_of_log
+from hil.figures.plot_data import PlotData
+from hil.judge.run_data import RunData, run_data_of_log
 from hil.judge.summary import summarise
 from hil.log.reader import Log
 from hil.reports.run_report import run_report
@@ -27,8 +27,8 @@ NAN = math.nan
 LARGEST_BYTES = 3_000_000
 
 
-def report(evidence: Evidence) -> str:
-    return run_report(Shown.of(evidence), summarise(evidence))
+def report(run_data: RunData) -> str:
+    return run_report(PlotData.of(run_data), summarise(run_data))
 
 
 def words(page: str) -> str:
@@ -44,7 +44,7 @@ def titles(page: str) -> list[str]:
 @pytest.fixture(scope="module")
 def written(short_log: Log, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.html"
-    path.write_text(report(evidence_of_log(short_log)), encoding="utf-8")
+    path.write_text(report(run_data_of_log(short_log)), encoding="utf-8")
     return path
 
 
@@ -62,21 +62,21 @@ def test_a_report_opens_without_a_network_and_fits_the_screen(
     assert min(seen.inks) > 0  # frames, grids and letters are grey
 
 
-def no_truth(evidence: Evidence) -> Evidence:
-    return replace(evidence, truth=[], commands=[], motion_since_ns=None, frames=None)
+def no_truth(run_data: RunData) -> RunData:
+    return replace(run_data, truth=[], commands=[], motion_since_ns=None, frames=None)
 
 
-def no_estimates(evidence: Evidence) -> Evidence:
-    return replace(evidence, estimates=[])
+def no_estimates(run_data: RunData) -> RunData:
+    return replace(run_data, estimates=[])
 
 
-def nothing(evidence: Evidence) -> Evidence:
-    return replace(no_truth(evidence), estimates=[])
+def nothing(run_data: RunData) -> RunData:
+    return replace(no_truth(run_data), estimates=[])
 
 
-def positions_only(evidence: Evidence) -> Evidence:
-    poses = [replace(each, v1=NAN, u1=NAN, v2=NAN, u2=NAN) for each in evidence.truth]
-    return replace(evidence, truth=poses, commands=[], motion_since_ns=None, frames=None)
+def positions_only(run_data: RunData) -> RunData:
+    poses = [replace(each, v1=NAN, u1=NAN, v2=NAN, u2=NAN) for each in run_data.truth]
+    return replace(run_data, truth=poses, commands=[], motion_since_ns=None, frames=None)
 
 
 @pytest.mark.parametrize(
@@ -93,12 +93,12 @@ def positions_only(evidence: Evidence) -> Evidence:
     ],
 )
 def test_what_is_not_known_is_left_out(
-    exact_evidence: Evidence,
-    lack: Callable[[Evidence], Evidence],
+    exact_run_data: RunData,
+    lack: Callable[[RunData], RunData],
     absent: tuple[str, ...],
     present: tuple[str, ...],
 ) -> None:
-    said = words(report(lack(exact_evidence)))
+    said = words(report(lack(exact_run_data)))
     assert [each for each in absent if each in said] == []
     assert [each for each in present if each not in said] == []
     assert not re.search(r"\b(nan|None|inf)\b", said)
@@ -106,7 +106,7 @@ def test_what_is_not_known_is_left_out(
 
 @pytest.mark.slow
 def test_the_same_run_gives_the_same_report(written: Path, short_log: Log) -> None:
-    again = report(evidence_of_log(short_log))
+    again = report(run_data_of_log(short_log))
     assert renumbered(again) == renumbered(written.read_text(encoding="utf-8"))
 
 
@@ -121,20 +121,20 @@ EVIL = "</title></script><script>alert(1)</script>"
 
 
 @pytest.mark.slow
-def test_certified_radii_are_drawn_with_the_estimates(exact_evidence: Evidence) -> None:
+def test_certified_radii_are_drawn_with_the_estimates(exact_run_data: RunData) -> None:
     certified = [
         CertifiedEstimate(each.header, each.computed, each.v1, 0.02, each.alpha1, 0.3, 50, "")
-        for each in exact_evidence.estimates
+        for each in exact_run_data.estimates
     ]
-    said = words(report(replace(exact_evidence, certified=certified)))
+    said = words(report(replace(exact_run_data, certified=certified)))
     assert "Certified radius: up to 0.02 m/s" in said
     assert "radius of v₁, median 20 mm/s" in said
 
 
 @pytest.fixture(scope="module")
-def eventful(exact_evidence: Evidence) -> str:
+def eventful(exact_run_data: RunData) -> str:
     """Report of a run with three samples outside their bounds, stops, estimates lost, and hostile texts."""
-    estimates, commands = list(exact_evidence.estimates), list(exact_evidence.commands)
+    estimates, commands = list(exact_run_data.estimates), list(exact_run_data.commands)
     for number in (100, 150, 151):
         estimates[number] = replace(
             estimates[number], v1=estimates[number].v1 + 0.01, alpha1=estimates[number].alpha1 + 0.1
@@ -143,12 +143,12 @@ def eventful(exact_evidence: Evidence) -> str:
         estimates[number] = replace(estimates[number], status=int(Status.LOST))
     for number in range(60, 90):
         commands[number] = replace(commands[number], v2=0.0, u2=0.0, stop="stale</script><b>", fresh=False)
-    named = msgspec.structs.replace(exact_evidence.scenario, name=EVIL)
-    evidence = replace(exact_evidence, scenario=named, estimates=estimates, commands=commands)
+    named = msgspec.structs.replace(exact_run_data.scenario, name=EVIL)
+    run_data = replace(exact_run_data, scenario=named, estimates=estimates, commands=commands)
     certificate = {"h": {"sound": 0.25, "assumes": ["calm", "order"]}, "k_u_star": {"why": "<too fast>"}}
-    summary = summarise(evidence) | {"certificate": certificate, "weather": {"wind": [0.5, 0.25]}}
+    summary = summarise(run_data) | {"certificate": certificate, "weather": {"wind": [0.5, 0.25]}}
     summary["rejected"] = {"gated": 1, "swapped": 2}
-    return run_report(Shown.of(evidence), summary)
+    return run_report(PlotData.of(run_data), summary)
 
 
 def test_the_head_says_what_was_run_and_how_it_went(eventful: str) -> None:

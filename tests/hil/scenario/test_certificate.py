@@ -10,7 +10,7 @@ from hil.log.metadata import certificate_metadata, recorded_certificate
 from hil.log.reader import read_log
 from hil.log.report_json import known
 from hil.log.writer import LogWriter
-from hil.scenario.certificate import certificate_json, certificate_of, premises_of
+from hil.scenario.certificate import assumptions_of, certificate_json, certificate_of
 from hil.scenario.files import load_scenario, scenario_names
 
 CONTRACT = {
@@ -27,8 +27,8 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[str, s
     with pytest.raises(SystemExit) as ended:
         main(["bounds", *arguments])
     assert ended.value.code == 0
-    told = capsys.readouterr()
-    return told.out, told.err
+    captured = capsys.readouterr()
+    return captured.out, captured.err
 
 
 def test_json_has_the_keys_of_the_contract_and_what_each_rests_on(capsys: pytest.CaptureFixture[str]) -> None:
@@ -37,7 +37,7 @@ def test_json_has_the_keys_of_the_contract_and_what_each_rests_on(capsys: pytest
     assert not err
     for name, keys in CONTRACT.items():
         assert keys <= set(found[name]), name
-        assert all(isinstance(premise, str) for premise in found[name]["assumes"])
+        assert all(isinstance(assumption, str) for assumption in found[name]["assumes"])
     assert found["formation"]["rho_min"] == pytest.approx(0.157, abs=1e-3)
     assert found["formation"]["rho_max"] == pytest.approx(0.267, abs=1e-3)
 
@@ -62,15 +62,15 @@ def test_every_shipped_pair_has_a_certificate_that_travels_in_metadata(name: str
     assert recorded_certificate(read_log(tmp_path / "without.mcap")) is None
 
 
-def test_premises_come_from_what_the_lab_knows() -> None:
+def test_assumptions_come_from_what_the_lab_knows() -> None:
     noisy = load_scenario("turtlebot3", ["mocap.sigma_position=0.001"])
-    assert premises_of(noisy).eps == pytest.approx(0.005)
+    assert assumptions_of(noisy).eps == pytest.approx(0.005)
     lidar = load_scenario("turtlebot3", ["estimator.front_end=body", "estimator.sigma_bearing=0.1"])
-    assert premises_of(lidar).eps == pytest.approx(5.0 * 0.1 * 0.2)
-    recorded = premises_of(load_scenario("turtlebot3"), driven=False)
+    assert assumptions_of(lidar).eps == pytest.approx(5.0 * 0.1 * 0.2)
+    recorded = assumptions_of(load_scenario("turtlebot3"), driven=False)
     assert (recorded.speeds.lowest, recorded.speeds.highest) == (0.04, 0.1)
     standing = load_scenario("turtlebot3", ["leader.program={kind='constant', v=0.0}"])
-    assert premises_of(standing).speeds == recorded.speeds
+    assert assumptions_of(standing).speeds == recorded.speeds
 
 
 def test_the_left_mirrors_the_right_and_other_formations_are_not_certified() -> None:

@@ -30,18 +30,18 @@ def written(default: Any) -> str:
     return IN_WORDS.get(default, f"{default:g}") if isinstance(default, int | float) else ""
 
 
-def keys_told() -> dict[str, dict[str, str]]:
+def keys_documented() -> dict[str, dict[str, str]]:
     """Default of every key by section, as the document has it; a row may hold several keys."""
-    told: dict[str, dict[str, str]] = {}
+    documented: dict[str, dict[str, str]] = {}
     section = ""
     for line in KEYS.read_text(encoding="utf-8").splitlines():
         if heading := re.match(r"## \[(\w+)\]", line):
             section = heading[1]
-            told[section] = {}
+            documented[section] = {}
         elif row := re.match(r"\| (`.*?) \|(.*?)\|", line):
             names = re.findall(r"`(\w+)`", row[1])
-            told[section] |= zip_longest(names, filter(None, row[2].strip().split(", ")), fillvalue="")
-    return told
+            documented[section] |= zip_longest(names, filter(None, row[2].strip().split(", ")), fillvalue="")
+    return documented
 
 
 def test_every_key_is_documented_with_its_default() -> None:
@@ -52,4 +52,4 @@ def test_every_key_is_documented_with_its_default() -> None:
                 wanted[part.name] = {
                     key.name: "" if key.required else written(key.default) for key in fields(kind)
                 }
-    assert keys_told() == wanted
+    assert keys_documented() == wanted

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pyarrow import parquet
 
 from hil.errors import UsageError
-from hil.judge.evidence import evidence_of_log
+from hil.judge.run_data import run_data_of_log
 from hil.judge.summary import summarise
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import read_log
@@ -72,7 +72,7 @@ def test_a_cell_of_one_run_has_the_figures_of_its_lockstep_run(
     for cell, found in zip(sweep.cells(), flown(sweep, tmp_path)["cells"], strict=True):
         log = tmp_path / f"{cell.index}.mcap"
         run_lockstep(sweep.scenario_of(cell, run_seed(sweep.spec.seed, 0)), log)
-        wanted = summarise(evidence_of_log(read_log(log)))
+        wanted = summarise(run_data_of_log(read_log(log)))
         estimation, bounds = wanted["estimation"], wanted["bounds"]
         assert found["samples"] == estimation["samples"]
         for name in ("rmse", "coverage_3sigma", "efficiency"):
@@ -149,7 +149,7 @@ def test_two_workers_give_the_bits_of_one(make_sweep: Callable[..., Sweep], tmp_
 PATIENCE = 150.0
 
 
-def told_address(scheduler: subprocess.Popen[bytes], file: Path) -> str:
+def scheduler_address(scheduler: subprocess.Popen[bytes], file: Path) -> str:
     """Where a scheduler listens; it writes its file in no hurry, so the file may be there half written."""
     give_up = time.monotonic() + PATIENCE
     while scheduler.poll() is None and time.monotonic() < give_up:
@@ -174,7 +174,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]
     try:
         here = ["--host", "127.0.0.1"]
         scheduler = start("scheduler", *here, "--port", "0", "--scheduler-file", str(file))
-        address = told_address(scheduler, file)
+        address = scheduler_address(scheduler, file)
         alone = ["--no-nanny", "--nthreads", "1", "--memory-limit", "0", "--local-directory", str(tmp_path)]
         yield address, [start("worker", address, *here, *alone) for _ in range(2)]
     finally:
@@ -226,12 +226,12 @@ def test_the_worst_run_is_kept_and_linked_from_the_report(
         "ekf",
         "difference",
     ]
-    told = result["cells"][cell]["bounds"]["tightness"]
+    tightness = result["cells"][cell]["bounds"]["tightness"]
     kept = keep_run(sweep, folder, cell, run)
     summary = json.loads((kept / "summary.json").read_text())
-    nearest = {name: each for name, each in told.items() if name.endswith("_extended")}
+    nearest = {name: each for name, each in tightness.items() if name.endswith("_extended")}
     name = max(nearest, key=lambda each: nearest[each])
-    assert summary["bounds"]["tightness"][name] == pytest.approx(told[name], rel=1e-6)
+    assert summary["bounds"]["tightness"][name] == pytest.approx(tightness[name], rel=1e-6)
     write_results(sweep, result, folder)
     assert f"{kept.name}/report.html" in (folder / "report.html").read_text()
     assert json.loads((folder / "results.json").read_text())["cells"][cell]["kept"] == {str(run): kept.name}

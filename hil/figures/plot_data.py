@@ -15,8 +15,8 @@ from formation.angles import FloatArray
 from hil.judge.bounds import WorstErrors, bound_errors, named_bounds, worst_errors
 from hil.judge.certified import CertifiedColumns
 from hil.judge.columns import Columns, EstimateColumns, columns_of
-from hil.judge.evidence import Evidence
 from hil.judge.noise_free_orbit import NoiseFreeOrbit, noise_free_orbit
+from hil.judge.run_data import RunData
 from hil.judge.side_orders import desired_bearings
 from hil.judge.true_states import Stamps, TrueStates
 
@@ -25,7 +25,7 @@ LONGEST_LINE = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shown:
+class PlotData:
     """What is drawn. ``tracked``: estimates of the whole run that say TRACKING, and their truth.
 
     ``worst``: what the bounds rest on, None without judged samples; ``bounds``, ``errors``: the named bounds
@@ -33,7 +33,7 @@ class Shown:
     noise-free run, where it is known; ``certified``: estimates with guaranteed radii, where there are any.
     """
 
-    evidence: Evidence
+    run_data: RunData
     columns: Columns
     tracked: EstimateColumns
     tracked_true: TrueStates
@@ -44,11 +44,11 @@ class Shown:
     certified: CertifiedColumns
 
     @staticmethod
-    def of(evidence: Evidence) -> Shown:
-        """Gather what is drawn of an evidence."""
-        columns = columns_of(evidence)
-        driven = evidence.motion_since_ns is not None
-        scenario, orders = evidence.scenario, evidence.orders
+    def of(run_data: RunData) -> PlotData:
+        """Gather what is drawn of a run's data."""
+        columns = columns_of(run_data)
+        driven = run_data.motion_since_ns is not None
+        scenario, orders = run_data.scenario, run_data.orders
         orbit = noise_free_orbit(scenario, columns.truth, columns.run, orders) if driven else None
         during = columns.estimates.capture_ns <= columns.run.to_ns
         tracked = columns.estimates.only((columns.estimates.status == Status.TRACKING) & during)
@@ -56,20 +56,20 @@ class Shown:
         bounds: Mapping[str, FloatArray] = {}
         errors: Mapping[str, FloatArray] = {}
         if len(columns.samples.capture_ns):
-            worst = worst_errors(evidence.scenario, columns)
-            bounds = named_bounds(evidence.scenario, columns, worst)
-            errors = bound_errors(evidence.scenario, columns)
+            worst = worst_errors(run_data.scenario, columns)
+            bounds = named_bounds(run_data.scenario, columns, worst)
+            errors = bound_errors(run_data.scenario, columns)
         true = columns.truth.at(tracked.capture_ns)
-        certified = CertifiedColumns.of(evidence.certified, columns.span)
-        return Shown(evidence, columns, tracked, true, worst, bounds, errors, orbit, certified)
+        certified = CertifiedColumns.of(run_data.certified, columns.span)
+        return PlotData(run_data, columns, tracked, true, worst, bounds, errors, orbit, certified)
 
     def seconds(self, moments_ns: Stamps) -> FloatArray:
         """Moments as seconds of the run."""
-        return np.asarray((moments_ns - self.evidence.zero_ns) * 1e-9, dtype=np.float64)
+        return np.asarray((moments_ns - self.run_data.zero_ns) * 1e-9, dtype=np.float64)
 
     def desired(self) -> tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]]:
         """Seconds and (rho, alpha1, alpha2) of the station over the run, with a corner at every order."""
-        run, scenario, orders = self.columns.run, self.evidence.scenario, self.evidence.orders
+        run, scenario, orders = self.columns.run, self.run_data.scenario, self.run_data.orders
         given = [order.given_ns for order in orders if run.from_ns < order.given_ns < run.to_ns]
         corners = np.array([run.from_ns, *(ns for each in given for ns in (each - 1, each)), run.to_ns])
         rho = np.full(len(corners), scenario.formation.rho_0)

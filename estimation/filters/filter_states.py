@@ -1,4 +1,4 @@
-"""What some estimators know beyond mean and covariance: plain data that travels in the belief."""
+"""Filter states: what some estimators know beyond mean and covariance, plain data in the belief."""
 
 from __future__ import annotations
 
@@ -73,20 +73,20 @@ class Excitation:
     """How much a pair has moved against each other of late, as weighted sums over its moments.
 
     In the frame along the leader's velocity: ``sight`` of the unit vectors to the leader, ``own`` of the
-    follower's velocities [m/s], both as x + iy; ``own_squared`` of their squared lengths; ``doubt`` of the
-    variances [rad^2] with which the leader's direction was known.
+    follower's velocities [m/s], both as x + iy; ``own_squared`` of their squared lengths;
+    ``direction_variance`` of the variances [rad^2] with which the leader's direction was known.
     """
 
     weight: float = 0.0
     sight: complex = 0.0
     own: complex = 0.0
     own_squared: float = 0.0
-    doubt: float = 0.0
+    direction_variance: float = 0.0
 
     @property
     def sd_direction(self) -> float:
         """Root mean square [rad] of how well the leader's direction was known; infinite without a moment."""
-        return math.sqrt(self.doubt / self.weight) if self.weight > 0.0 else math.inf
+        return math.sqrt(self.direction_variance / self.weight) if self.weight > 0.0 else math.inf
 
     @property
     def sight_spread(self) -> float:
@@ -107,13 +107,13 @@ class Excitation:
 class SensorOffsets:
     """Offsets (2,) of a sensor's range [m] and bearing [rad], measured minus true.
 
-    covariance: (2, 2). cross: (5, 2), with the leader's states. range_told, bearing_told: whether the pair
-    moves so that they can be told; until then they are left as they are.
+    covariance: (2, 2). cross: (5, 2), with the leader's states. range_observable, bearing_observable: whether
+    the pair moves so that they can be told; until then they are left as they are.
     """
 
     mean: Vector
     covariance: Matrix
     cross: Matrix
     excitation: Excitation = Excitation()
-    range_told: bool = False
-    bearing_told: bool = False
+    range_observable: bool = False
+    bearing_observable: bool = False

@@ -1,4 +1,4 @@
-"""Fewer points than a screen can show, with every peak still there."""
+"""Decimation: fewer points than a screen can show, with every peak still there."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MOST_POINTS = 2000
 """Of a line; a panel on a desk is some 600 pixels wide, and one can zoom in a little."""
 
 
-def telling_rows(values: FloatArray, most: int = MOST_POINTS) -> NDArray[np.intp]:
+def decimated_rows(values: FloatArray, most: int = MOST_POINTS) -> NDArray[np.intp]:
     """Rows, in order, that draw the same line: of every stretch its least and its largest value.
 
     ``values`` (n,). First and last row are kept, and so is the first NaN of every gap, that the line stays

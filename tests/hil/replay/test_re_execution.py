@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hil.log.events import Recorded
 from hil.nodes.node import Outgoing
-from hil.replay.journal import Journey, feed, index_by_digest, parity_of, refeed
+from hil.replay.re_execution import Execution, execute, index_by_digest, parity_of, re_execute
 from hil.wire.events import Event
 
 PERIOD_NS = 50
@@ -55,80 +55,80 @@ class TallyNode:
         return replace(state, receipts=()), out
 
 
-def recorded(journey: Journey[TallyState]) -> list[Recorded]:
+def recorded(execution: Execution[TallyState]) -> list[Recorded]:
     outputs = []
-    for message in journey.outputs:
+    for message in execution.outputs:
         if message.topic == "out":
             now_ns, _, receipts = json.loads(message.payload)
             outputs.append(Recorded(message.payload, now_ns, tuple((name, at) for name, at in receipts)))
     return outputs
 
 
-def logged_drive(journey: Journey[TallyState]) -> list[bytes]:
-    return [each.payload for each in journey.outputs if each.topic == "drive"]
+def logged_drive(execution: Execution[TallyState]) -> list[bytes]:
+    return [each.payload for each in execution.outputs if each.topic == "drive"]
 
 
-lives = st.lists(st.tuples(st.integers(0, 255), st.integers(0, 120)), min_size=1, max_size=40)
+logged_steps = st.lists(st.tuples(st.integers(0, 255), st.integers(0, 120)), min_size=1, max_size=40)
 
 
-def live(steps: list[tuple[int, int]]) -> tuple[list[tuple[Event, int]], Journey[TallyState]]:
+def live(steps: list[tuple[int, int]]) -> tuple[list[tuple[Event, int]], Execution[TallyState]]:
     """A life in which every input is another payload, at times that now and then are equal."""
     now_ns, events = 1000, []
     for number, (value, gap) in enumerate(steps):
         now_ns += gap
         events.append((Event("in", bytes([value, number])), now_ns))
-    return events, feed(TallyNode(), events)
+    return events, execute(TallyNode(), events)
 
 
-@given(lives)
+@given(logged_steps)
 def test_a_life_with_ticks_and_silent_inputs_is_repeated_bit_for_bit(steps: list[tuple[int, int]]) -> None:
-    events, journey = live(steps)
-    again = refeed(TallyNode(), "out", recorded(journey), index_by_digest(events))
-    parity = parity_of(again.repeated, "out", {"drive": logged_drive(journey)})
+    events, execution = live(steps)
+    again = re_execute(TallyNode(), "out", recorded(execution), index_by_digest(events))
+    parity = parity_of(again.repeated, "out", {"drive": logged_drive(execution)})
     assert (parity.mismatched, parity.first, again.missing) == (0, None, 0)
-    assert parity.compared == len(recorded(journey))
-    assert again.outputs == journey.outputs
+    assert parity.compared == len(recorded(execution))
+    assert again.outputs == execution.outputs
 
 
-@given(lives, lives)
+@given(logged_steps, logged_steps)
 def test_a_node_that_was_started_again_is_repeated_all_the_same(
     before: list[tuple[int, int]], after: list[tuple[int, int]]
 ) -> None:
     events, first = live(before)
     later = [(Event("in", event.payload + b"!"), now_ns + 10**6) for event, now_ns in live(after)[0]]
-    second = feed(TallyNode(), later)
+    second = execute(TallyNode(), later)
     outputs = recorded(first) + recorded(second)
-    again = refeed(TallyNode(), "out", outputs, index_by_digest([*events, *later]))
+    again = re_execute(TallyNode(), "out", outputs, index_by_digest([*events, *later]))
     parity = parity_of(again.repeated, "out", {"drive": logged_drive(first) + logged_drive(second)})
     assert (parity.compared, parity.mismatched, again.missing) == (len(outputs), 0, 0)
     assert again.restarts == (len(recorded(first)) > 0 and len(recorded(second)) > 0)
 
 
-@given(lives, st.data())
+@given(logged_steps, st.data())
 def test_an_input_that_the_log_lacks_is_counted_and_shows_as_a_mismatch(
     steps: list[tuple[int, int]], data: st.DataObject
 ) -> None:
-    events, journey = live(steps)
-    outputs = recorded(journey)
+    events, execution = live(steps)
+    outputs = recorded(execution)
     consumed = {name for output in outputs for name, _ in output.consumed}
     index = index_by_digest(events)
     if not consumed:
         return
     lost = data.draw(st.sampled_from(sorted(consumed)))
     del index[lost]
-    again = refeed(TallyNode(), "out", outputs, index)
+    again = re_execute(TallyNode(), "out", outputs, index)
     parity = parity_of(again.repeated, "out", {})
     place = next(n for n, output in enumerate(outputs) if lost in {name for name, _ in output.consumed})
     assert again.missing == 1
     assert parity.first == place
 
 
-@given(lives, st.data())
+@given(logged_steps, st.data())
 def test_a_flipped_bit_in_an_output_is_found_there_and_only_there(
     steps: list[tuple[int, int]], data: st.DataObject
 ) -> None:
-    events, journey = live(steps)
-    outputs = recorded(journey)
+    events, execution = live(steps)
+    outputs = recorded(execution)
     if not outputs:
         return
     place = data.draw(st.integers(0, len(outputs) - 1))
@@ -136,7 +136,7 @@ def test_a_flipped_bit_in_an_output_is_found_there_and_only_there(
     broken = bytearray(outputs[place].payload)
     broken[bit // 8] ^= 1 << bit % 8
     outputs[place] = replace(outputs[place], payload=bytes(broken))
-    parity = parity_of(refeed(TallyNode(), "out", outputs, index_by_digest(events)).repeated, "out", {})
+    parity = parity_of(re_execute(TallyNode(), "out", outputs, index_by_digest(events)).repeated, "out", {})
     assert (parity.mismatched, parity.first) == (1, place)
 
 
@@ -160,41 +160,41 @@ OTHERS = b"other"
 def test_beside_the_output_a_changed_message_differs_and_a_missed_one_cannot_be_compared(
     change: Callable[[list[bytes]], list[bytes]], expected: tuple[int, int | None, int]
 ) -> None:
-    events, journey = live(ROUTE)
-    sent = logged_drive(journey)
+    events, execution = live(ROUTE)
+    sent = logged_drive(execution)
     assert len(sent) == 4
-    again = refeed(TallyNode(), "out", recorded(journey), index_by_digest(events))
+    again = re_execute(TallyNode(), "out", recorded(execution), index_by_digest(events))
     parity = parity_of(again.repeated, "out", {"drive": change(sent)})
     assert (parity.mismatched, parity.first, parity.unrecorded) == expected
 
 
-@given(lives, st.data())
+@given(logged_steps, st.data())
 def test_messages_that_repeat_may_be_missed_without_a_difference(
     steps: list[tuple[int, int]], data: st.DataObject
 ) -> None:
     """Payloads of a robot that stands are all the same; missing some shifts the others, no more."""
-    events, journey = live([(value % 2, gap) for value, gap in steps])
-    sent = logged_drive(journey)
+    events, execution = live([(value % 2, gap) for value, gap in steps])
+    sent = logged_drive(execution)
     kept = data.draw(st.lists(st.booleans(), min_size=len(sent), max_size=len(sent)))
     logged = [name for name, keep in zip(sent, kept, strict=True) if keep]
-    again = refeed(TallyNode(), "out", recorded(journey), index_by_digest(events))
+    again = re_execute(TallyNode(), "out", recorded(execution), index_by_digest(events))
     parity = parity_of(again.repeated, "out", {"drive": logged})
     assert parity.mismatched == 0
     assert parity.unrecorded >= len(sent) - len(logged)
 
 
 def test_an_output_that_cannot_be_read_is_a_mismatch_and_no_step() -> None:
-    journey = refeed(TallyNode(), "out", [Recorded(b"\0", None)], {})
-    assert parity_of(journey.repeated, "out", {}).mismatched == 1
-    assert journey.outputs == ()
+    execution = re_execute(TallyNode(), "out", [Recorded(b"\0", None)], {})
+    assert parity_of(execution.repeated, "out", {}).mismatched == 1
+    assert execution.outputs == ()
 
 
 def test_ticks_fall_due_between_the_events_and_never_at_an_event() -> None:
-    _, journey = live([(1, 0), (0, 120), (0, 30)])
-    assert [each.stamp_ns for each in journey.outputs if each.topic == "out"] == [1000, 1000, 1050, 1100]
+    _, execution = live([(1, 0), (0, 120), (0, 30)])
+    assert [each.stamp_ns for each in execution.outputs if each.topic == "out"] == [1000, 1000, 1050, 1100]
 
 
 def test_a_life_without_events_ends_where_it_begins() -> None:
     node = TallyNode()
-    assert feed(node, []) == Journey(node.begin(0), ())
-    assert refeed(node, "out", [], {}).state == node.begin(0)
+    assert execute(node, []) == Execution(node.begin(0), ())
+    assert re_execute(node, "out", [], {}).state == node.begin(0)

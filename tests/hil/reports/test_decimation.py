@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil.reports.thinning import spread_rows, telling_rows
+from hil.reports.decimation import decimated_rows, spread_rows
 
 VALUES = st.lists(st.floats(-1e6, 1e6) | st.just(math.nan), max_size=400)
 
@@ -14,7 +14,7 @@ VALUES = st.lists(st.floats(-1e6, 1e6) | st.just(math.nan), max_size=400)
 @given(values=VALUES, most=st.integers(4, 60))
 def test_no_peak_no_end_and_no_gap_is_lost(values: list[float], most: int) -> None:
     given_values = np.array(values, dtype=np.float64)
-    rows = telling_rows(given_values, most)
+    rows = decimated_rows(given_values, most)
     kept = given_values[rows]
     assert np.all(np.diff(rows) > 0)
     known = given_values[np.isfinite(given_values)]
@@ -34,7 +34,7 @@ def test_every_short_spike_stays_where_it_was() -> None:
     values = np.sin(np.arange(100_000) * 1e-3)
     spikes = [17, 5_003, 5_500, 99_990]
     values[spikes] = [9.0, -9.0, 9.0, -9.0]
-    rows = telling_rows(values)
+    rows = decimated_rows(values)
     assert set(spikes) <= set(rows.tolist())
     assert len(rows) <= 2000
 

@@ -12,7 +12,7 @@ from formation.station import Side
 
 
 @dataclass(frozen=True, slots=True)
-class Premises:
+class Assumptions:
     """What a certificate starts from.
 
     ``eps``: bound of the error of each measured leader position, in any direction [m]. ``step``: time between

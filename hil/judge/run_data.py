@@ -54,7 +54,7 @@ class Frames:
 
 @dataclass(frozen=True, slots=True)
 class LogFacts:
-    """The log that the evidence comes from: its path, its messages, its size."""
+    """The log that the run data comes from: its path, its messages, its size."""
 
     path: str
     messages: int
@@ -62,7 +62,7 @@ class LogFacts:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Evidence:
+class RunData:
     """All that :func:`hil.judge.summary.summarise` looks at; messages in the order of their publication.
 
     ``taken``, ``refused``: the estimator's counts, by kind and by cause. ``zero_ns``: where the run's time in
@@ -74,7 +74,7 @@ class Evidence:
     the log carries for this very scenario, None if it is to be worked out.
     ``orders``: to change sides, as they were given.
 
-    A replay is judged on the evidence of its log with its own estimates and counts put in by
+    A replay is judged on the run data of its log with its own estimates and counts put in by
     :func:`dataclasses.replace`.
     """
 
@@ -111,31 +111,31 @@ class Span:
         return (self.to_ns - self.from_ns) / 1e9
 
 
-def run_span(evidence: Evidence) -> Span:
+def run_span(run_data: RunData) -> Span:
     """From when the leader set off to the stop or the end of the scenario's duration, whichever is first.
 
     For a recording in which no emulated leader sets off: from the first to the last of its captures.
     """
-    captures = _captures(evidence)
-    if evidence.motion_since_ns is None:
-        return Span(min(captures, default=evidence.zero_ns), max(captures, default=evidence.zero_ns))
-    since_ns = evidence.motion_since_ns
-    ends = [since_ns + round(evidence.scenario.run.duration_s * 1e9), max(captures, default=since_ns)]
-    if evidence.stopped_ns is not None:
-        ends.append(evidence.stopped_ns)
+    captures = _captures(run_data)
+    if run_data.motion_since_ns is None:
+        return Span(min(captures, default=run_data.zero_ns), max(captures, default=run_data.zero_ns))
+    since_ns = run_data.motion_since_ns
+    ends = [since_ns + round(run_data.scenario.run.duration_s * 1e9), max(captures, default=since_ns)]
+    if run_data.stopped_ns is not None:
+        ends.append(run_data.stopped_ns)
     return Span(since_ns, max(since_ns, min(ends)))
 
 
-def evaluation_span(evidence: Evidence) -> Span:
-    """What is judged: what the evidence asks for, else the run from ``run.evaluate_from_s`` on.
+def evaluation_span(run_data: RunData) -> Span:
+    """What is judged: what the run data asks for, else the run from ``run.evaluate_from_s`` on.
 
     Of a run that does not last that long the second half is judged.
     """
-    run = run_span(evidence)
-    to_ns = run.to_ns if evidence.evaluate_to_ns is None else evidence.evaluate_to_ns
-    from_ns = evidence.evaluate_from_ns
+    run = run_span(run_data)
+    to_ns = run.to_ns if run_data.evaluate_to_ns is None else run_data.evaluate_to_ns
+    from_ns = run_data.evaluate_from_ns
     if from_ns is None:
-        from_ns = judged_from_ns(evidence.scenario, evidence.zero_ns, Span(run.from_ns, to_ns))
+        from_ns = judged_from_ns(run_data.scenario, run_data.zero_ns, Span(run.from_ns, to_ns))
     return Span(from_ns, to_ns)
 
 
@@ -145,8 +145,8 @@ def judged_from_ns(scenario: Scenario, zero_ns: int, run: Span) -> int:
     return from_ns if from_ns < run.to_ns else (run.from_ns + run.to_ns) // 2
 
 
-def evidence_of_log(log: Log, scenario: Scenario | None = None) -> Evidence:
-    """Evidence of what a log recorded, judged by the given scenario or by the log's own.
+def run_data_of_log(log: Log, scenario: Scenario | None = None) -> RunData:
+    """Run data of what a log recorded, judged by the given scenario or by the log's own.
 
     Its time in seconds counts from when the leader set off; in an imported log from the source's own zero,
     and in any other from the first stamp. Raises :class:`UsageError` for a log without a scenario if none is
@@ -156,13 +156,13 @@ def evidence_of_log(log: Log, scenario: Scenario | None = None) -> Evidence:
     scenario = scenario or own
     if scenario is None:
         raise UsageError(f"log {log.path}: does not tell its scenario; give one, or a map that names one")
-    evidence = evidence_of_link(log, Link(scenario))
+    run_data = run_data_of_link(log, Link(scenario))
     same = own is not None and same_steps(scenario, own)
-    return replace(evidence, certificate=recorded_certificate(log) if same else None)
+    return replace(run_data, certificate=recorded_certificate(log) if same else None)
 
 
-def evidence_of_link(log: Log, link: Link) -> Evidence:
-    """Evidence of what a log recorded of one follower of a chain, or of a pair.
+def run_data_of_link(log: Log, link: Link) -> RunData:
+    """Run data of what a log recorded of one follower of a chain, or of a pair.
 
     For a predecessor that no program drives the certificate is there: it assumes the limits alone. In a chain
     nobody takes orders to change sides.
@@ -175,7 +175,7 @@ def evidence_of_link(log: Log, link: Link) -> Evidence:
     truth = _decoded(log, records[names.truth], Truth)
     arrivals = _arrivals(log, records[topics.RIGID_BODIES], estimates)
     since = counts.get("emulator", {}).get("motion_since_ns")
-    evidence = Evidence(
+    run_data = RunData(
         scenario=scenario,
         mode=mode_of(log) or IMPORT,
         estimates=estimates,
@@ -192,19 +192,19 @@ def evidence_of_link(log: Log, link: Link) -> Evidence:
         log=LogFacts(str(log.path).encode(errors="replace").decode(), log.messages, log.path.stat().st_size),
         certificate=None if link.first else certificate_json(certificate_of(scenario, driven=False)),
     )
-    return replace(evidence, zero_ns=_zero_ns(log, evidence))
+    return replace(run_data, zero_ns=_zero_ns(log, run_data))
 
 
-def _zero_ns(log: Log, evidence: Evidence) -> int:
-    if evidence.motion_since_ns is not None:
-        return evidence.motion_since_ns
+def _zero_ns(log: Log, run_data: RunData) -> int:
+    if run_data.motion_since_ns is not None:
+        return run_data.motion_since_ns
     if mode_of(log) == IMPORT:
         return 0
-    return min(_captures(evidence), default=log.start_ns or 0)
+    return min(_captures(run_data), default=log.start_ns or 0)
 
 
-def _captures(evidence: Evidence) -> list[int]:
-    headers = [estimate.header for estimate in evidence.estimates] + [each.header for each in evidence.truth]
+def _captures(run_data: RunData) -> list[int]:
+    headers = [estimate.header for estimate in run_data.estimates] + [each.header for each in run_data.truth]
     return [to_ns(header.stamp) for header in headers]
 
 

@@ -26,15 +26,15 @@ _LONGEST_GLANCE = 0.25
 
 
 @dataclass(slots=True, eq=False)
-class Picture:
+class Snapshot:
     """The newest of everything, by the follower that it is of.
 
-    ``followers``: their names from the leader on. ``watched_s``: for how long we have looked. ``heard``: at
-    which ``watched_s`` each node last reported, ``problems``: what it said.
+    ``followers``: their names from the leader on. ``observed_s``: for how long we have looked. ``heard``: at
+    which ``observed_s`` each node last reported, ``problems``: what it said.
     """
 
     followers: tuple[str, ...] = ()
-    watched_s: float = 0.0
+    observed_s: float = 0.0
     heard: dict[str, float] = field(default_factory=dict)
     problems: dict[str, str] = field(default_factory=dict)
     motion_since_ns: int | None = None
@@ -54,12 +54,12 @@ class Picture:
 
     def silent(self, names: Iterable[str], patience: float) -> str | None:
         """A node that has reported before but not in the last ``patience`` [s]."""
-        since = self.watched_s - patience
+        since = self.observed_s - patience
         return next((n for n in names if n in self.heard and self.heard[n] < since), None)
 
-    def watch_on(self, seconds: float) -> None:
+    def advance(self, seconds: float) -> None:
         """Time has passed. Where it was long, we stood still too: the daemons may not be to blame."""
-        self.watched_s += min(seconds, _LONGEST_GLANCE)
+        self.observed_s += min(seconds, _LONGEST_GLANCE)
 
     def line(self, elapsed: float, duration: float) -> str:
         """One line for the person who watches."""
@@ -85,14 +85,14 @@ class Picture:
         yield f"v2 {' '.join(each.stop or f'{each.v2:+.3f}' for each in sent)} m/s"
 
 
-class Watch:
-    """Keeps a :class:`Picture` up to date from a session's subscriptions."""
+class RunMonitor:
+    """Keeps a :class:`Snapshot` up to date from a session's subscriptions."""
 
     def __init__(self, session: zenoh.Session, pairs: Sequence[Topics]) -> None:
-        self.picture = Picture(tuple(pair.follower for pair in pairs))
+        self.snapshot = Snapshot(tuple(pair.follower for pair in pairs))
         self._lock = threading.Lock()
         self._latest: dict[str, bytes] = {}
-        self._looked_at = time.monotonic()
+        self._updated_at = time.monotonic()
         self._subscribers = [
             session.declare_subscriber(topics.DIAGNOSTICS, self._on_diagnostics),
             *(
@@ -103,29 +103,29 @@ class Watch:
         ]
         self._pairs = pairs
 
-    def look(self) -> Picture:
-        """The picture as of now. Payloads are decoded here, not in Zenoh's threads."""
+    def update(self) -> Snapshot:
+        """The snapshot as of now. Payloads are decoded here, not in Zenoh's threads."""
         with self._lock:
             latest, self._latest = self._latest, {}
-        picture, looked_at = self.picture, time.monotonic()
-        picture.watch_on(looked_at - self._looked_at)
-        self._looked_at = looked_at
+        snapshot, now = self.snapshot, time.monotonic()
+        snapshot.advance(now - self._updated_at)
+        self._updated_at = now
         for pair in self._pairs:
             who = pair.follower
             if seen := _sound(latest, pair.estimate, msg.LeaderEstimate):
                 # A status that does not exist can't be shown either.
                 with contextlib.suppress(ValueError):
-                    picture.estimates[who] = replace(seen, status=Status(seen.status))
+                    snapshot.estimates[who] = replace(seen, status=Status(seen.status))
             if sure := _sound(latest, pair.certified, msg.CertifiedEstimate):
-                picture.certified[who] = sure
+                snapshot.certified[who] = sure
             if sent := _sound(latest, pair.command, msg.Command):
-                picture.commands[who] = sent
+                snapshot.commands[who] = sent
             if true := _sound(latest, pair.truth, msg.Truth):
-                picture.truths[who] = true
-        return picture
+                snapshot.truths[who] = true
+        return snapshot
 
     def close(self) -> None:
-        """Stop watching."""
+        """End the subscriptions."""
         for subscriber in self._subscribers:
             subscriber.undeclare()  # type: ignore[no-untyped-call]
         self._subscribers.clear()
@@ -142,11 +142,11 @@ class Watch:
             return
         for status in report.status:
             name = status.name.removeprefix("abreast/")
-            self.picture.heard[name] = self.picture.watched_s
-            self.picture.problems[name] = status.message if status.level else ""
+            self.snapshot.heard[name] = self.snapshot.observed_s
+            self.snapshot.problems[name] = status.message if status.level else ""
             for value in status.values:
                 if name == "emulator" and value.key == "motion_since_ns" and value.value.isdecimal():
-                    self.picture.motion_since_ns = min(int(value.value), stamp_ns)
+                    self.snapshot.motion_since_ns = min(int(value.value), stamp_ns)
 
 
 def _sound(latest: Mapping[str, bytes], topic: str, kind: type[M]) -> M | None:

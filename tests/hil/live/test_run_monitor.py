@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from hil.live.watch import Picture, Watch
+from hil.live.run_monitor import RunMonitor, Snapshot
 from hil.wire import message_types as msg
 from hil.wire.messages import encode, header, to_time
 from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
@@ -35,43 +35,43 @@ def command(stop: str) -> msg.Command:
 def test_an_estimate_that_cannot_be_is_not_shown_and_hides_nothing_else() -> None:
     with reserved_endpoint() as endpoint:
         session = open_session(Endpoints(listen=endpoint))
-    watch = Watch(session, [PAIR])
+    monitor = RunMonitor(session, [PAIR])
     try:
         session.put(PAIR.estimate, encode(estimate(status=1)))
         session.put(PAIR.certified, b"rubbish")
         session.put(PAIR.command, encode(command(stop="first")))
         deadline = time.monotonic() + 60.0
-        while not watch.look().commands and time.monotonic() < deadline:
+        while not monitor.update().commands and time.monotonic() < deadline:
             time.sleep(0.005)
         session.put(PAIR.estimate, encode(estimate(status=200)))
         session.put(PAIR.command, encode(command(stop="[/second]")))
-        while watch.look().commands["follower"].stop == "first" and time.monotonic() < deadline:
+        while monitor.update().commands["follower"].stop == "first" and time.monotonic() < deadline:
             time.sleep(0.005)
-        line = watch.picture.line(1.0, 2.0)
+        line = monitor.snapshot.line(1.0, 2.0)
     finally:
-        watch.close()
+        monitor.close()
         close_session(session)
     assert "tracking" in line
     assert "[/second]" in line
 
 
-def watched(picture: Picture, looks: int, seconds: float) -> str | None:
+def observed(snapshot: Snapshot, looks: int, seconds: float) -> str | None:
     for _ in range(looks):
-        picture.watch_on(seconds)
-    return picture.silent(("estimator", "emulator"), PATIENCE)
+        snapshot.advance(seconds)
+    return snapshot.silent(("estimator", "emulator"), PATIENCE)
 
 
 def test_a_daemon_that_was_heard_and_falls_silent_is_named() -> None:
-    picture = Picture()
-    assert watched(picture, 100, 0.05) is None
-    picture.heard["emulator"] = picture.watched_s
-    assert watched(picture, 50, 0.05) is None
-    assert watched(picture, 20, 0.05) == "emulator"
+    snapshot = Snapshot()
+    assert observed(snapshot, 100, 0.05) is None
+    snapshot.heard["emulator"] = snapshot.observed_s
+    assert observed(snapshot, 50, 0.05) is None
+    assert observed(snapshot, 20, 0.05) == "emulator"
 
 
 def test_a_machine_that_stands_still_makes_nobody_silent() -> None:
-    picture = Picture()
-    picture.heard["estimator"] = picture.watched_s
-    assert watched(picture, 1, 60.0) is None
-    assert watched(picture, 50, 0.05) is None
-    assert watched(picture, 20, 0.05) == "estimator"
+    snapshot = Snapshot()
+    snapshot.heard["estimator"] = snapshot.observed_s
+    assert observed(snapshot, 1, 60.0) is None
+    assert observed(snapshot, 50, 0.05) is None
+    assert observed(snapshot, 20, 0.05) == "estimator"

@@ -1,4 +1,4 @@
-"""Spells: stretches of time over which something stayed the same, such as a status or a reason to stand."""
+"""Time intervals over which something stayed the same, such as a status or a reason to stand."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from formation.angles import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
-class Spell:
+class TimeInterval:
     """``what`` held from ``from_s`` to ``to_s`` [s], over ``count`` samples in a row."""
 
     what: str
@@ -19,19 +19,19 @@ class Spell:
     count: int
 
 
-def spells_of(t: FloatArray, states: Sequence[str], longest_gap: float) -> list[Spell]:
-    """Spells of the states at the increasing times t [s], in order.
+def intervals_of(t: FloatArray, states: Sequence[str], longest_gap: float) -> list[TimeInterval]:
+    """Intervals of the states at the increasing times t [s], in order.
 
-    A spell lasts until the next sample, but never beyond ``longest_gap`` [s] after its own last one: of
+    An interval lasts until the next sample, but never beyond ``longest_gap`` [s] after its own last one: of
     what nobody reported nothing is known.
     """
-    spells: list[Spell] = []
+    intervals: list[TimeInterval] = []
     first = 0
     for what, group in groupby(states):
         count = sum(1 for _ in group)
         after = first + count
         last_t = float(t[after - 1])
         next_t = float(t[after]) if after < len(t) else last_t
-        spells.append(Spell(what, float(t[first]), min(next_t, last_t + longest_gap), count))
+        intervals.append(TimeInterval(what, float(t[first]), min(next_t, last_t + longest_gap), count))
         first = after
-    return spells
+    return intervals

@@ -14,28 +14,28 @@ _ROW_BYTES = 5 * 8
 
 
 @kernel
-def told_numbers(
-    told: Estimate, assumed: AssumedErrors, reason: int, consumed: int, now_ns: int
+def estimate_numbers(
+    estimate: Estimate, assumed: AssumedErrors, reason: int, consumed: int, now_ns: int
 ) -> EstimateNumbers:
     """Numbers of the message that tells an estimate at a time."""
-    bound = bounds_of(told, assumed)
+    bound = bounds_of(estimate, assumed)
     return EstimateNumbers(
-        told.capture_ns,
-        told.measured_ns,
+        estimate.capture_ns,
+        estimate.measured_ns,
         now_ns,
-        told.status,
+        estimate.status,
         reason,
         consumed,
-        told.rho,
-        told.alpha2,
-        told.rho_dot,
-        told.alpha2_dot,
-        told.v1,
-        told.alpha1,
-        told.u1,
-        told.v2,
-        told.u2,
-        told.nis,
+        estimate.rho,
+        estimate.alpha2,
+        estimate.rho_dot,
+        estimate.alpha2_dot,
+        estimate.v1,
+        estimate.alpha1,
+        estimate.u1,
+        estimate.v2,
+        estimate.u2,
+        estimate.nis,
         bound.v1,
         bound.alpha1,
         bound.h,
@@ -43,7 +43,7 @@ def told_numbers(
 
 
 @kernel(inline=False)
-def write_told(
+def write_estimate_message(
     buffer: Buffer,
     times_at: int,
     reasons: bytes,

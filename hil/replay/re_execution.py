@@ -1,7 +1,7 @@
-"""Putting logged inputs through a node again, step by step, to see whether the same comes out.
+"""Re-execution: logged inputs put through a node again, step by step, to see whether the same comes out.
 
 Every estimate and every command lists what its node had taken in since the one before, by digest, with the
-``now`` of each step. That, and the payloads themselves, is enough to repeat the node's life.
+``now`` of each step. That, and the payloads themselves, is enough to execute the node again.
 """
 
 from __future__ import annotations
@@ -43,10 +43,11 @@ class Parity:
 
 
 @dataclass(frozen=True, slots=True)
-class Journey(Generic[S]):
-    """A node's life: the state it ended in, and all its outputs. ``repeated`` is empty for a plain feed.
+class Execution(Generic[S]):
+    """Execution of a node: the state it ended in, and all its outputs.
 
-    ``restarts``: how often it was started again.
+    ``repeated``: the outputs by what they repeat, empty unless it is a re-execution. ``restarts``: how often
+    it was started again.
     """
 
     state: S
@@ -65,15 +66,15 @@ def index_by_digest(events: Iterable[Timed]) -> dict[int, Event]:
     return {event.digest: event for event, _ in events}
 
 
-def refeed(
+def re_execute(
     node: Node[S],
     topic: str,
     recorded: Sequence[Recorded],
     index: Mapping[int, Event],
     *,
     same_node: bool = True,
-) -> Journey[S]:
-    """Repeat a node's life from the outputs that it left on a topic.
+) -> Execution[S]:
+    """Execute a node again from the outputs that it left on a topic.
 
     An output that none of its inputs brings forth came from a tick at the time it was computed. Inputs that
     are missing in the index are passed over and counted; what was consumed after the last output, nobody can
@@ -93,7 +94,7 @@ def refeed(
         state = after
         repeated.append(step)
     outputs = tuple(message for step in repeated for message in step.outputs)
-    return Journey(state, outputs, tuple(repeated), restarts)
+    return Execution(state, outputs, tuple(repeated), restarts)
 
 
 def _repeat(
@@ -114,8 +115,8 @@ def _repeat(
     return state, Repeated(output, tuple(out), missing)
 
 
-def feed(node: Node[S], events: Iterable[Timed]) -> Journey[S]:
-    """Let a node live through events in their order, with its own ticks where they fall due in between."""
+def execute(node: Node[S], events: Iterable[Timed]) -> Execution[S]:
+    """Execute a node on events in their order, with its own ticks where they fall due in between."""
     outputs: list[Outgoing] = []
     state: S | None = None
     for event, now_ns in events:
@@ -126,7 +127,7 @@ def feed(node: Node[S], events: Iterable[Timed]) -> Journey[S]:
             outputs.extend(sent)
         state, sent = node.step(state, event, now_ns)
         outputs.extend(sent)
-    return Journey(node.begin(0) if state is None else state, tuple(outputs))
+    return Execution(node.begin(0) if state is None else state, tuple(outputs))
 
 
 def parity_of(repeated: Sequence[Repeated], topic: str, beside: Mapping[str, Sequence[bytes]]) -> Parity:

@@ -48,7 +48,7 @@ class TurnTrend(NamedTuple):
 NO_TREND = TurnTrend(False, 0, 0.0, 0.0, 0.0)
 
 
-class Foresight(NamedTuple):
+class TurnPrediction(NamedTuple):
     """What is known of the leader's steering: |u1| <= k_u [rad/s], and diffusion [rad^2/s^3] of u1.
 
     ``spread``: variance S [rad^2/s^2] of u1 before anything is seen. Made by :meth:`of`.
@@ -59,15 +59,15 @@ class Foresight(NamedTuple):
     spread: float
 
     @staticmethod
-    def of(k_u: float, diffusion: float) -> Foresight:
-        """Foresight with the spread of sinusoidal steering to the limit.
+    def of(k_u: float, diffusion: float) -> TurnPrediction:
+        """Prediction with the spread of sinusoidal steering to the limit.
 
         Raises :class:`ValueError` unless both numbers are positive and finite.
         """
         for name, value in (("k_u", k_u), ("diffusion", diffusion)):
             if not (value > 0.0 and math.isfinite(value)):
                 raise ValueError(f"{name} is {value}, expected a positive finite number")
-        return Foresight(k_u, diffusion, 0.5 * k_u * k_u)
+        return TurnPrediction(k_u, diffusion, 0.5 * k_u * k_u)
 
     @kernel
     def heard(
@@ -113,17 +113,17 @@ class Foresight(NamedTuple):
         that of u1, so that E counts (1 + mu1 D / 2)^2 times. Taken is 1.5 for all, its value for mu1 = 1.5
         per second and D = 0.3 s.
         """
-        doubt = held(self, variance, ahead) / self.spread
-        return max(0.0, 1.0 - _ERRORS_TOGETHER * doubt * doubt)
+        ratio = held(self, variance, ahead) / self.spread
+        return max(0.0, 1.0 - _ERRORS_TOGETHER * ratio * ratio)
 
 
 @kernel
-def held(foresight: Foresight, variance: float, ahead: float) -> float:
+def held(turn_prediction: TurnPrediction, variance: float, ahead: float) -> float:
     """Variance V [rad^2/s^2] of an estimate of u1 that is held for ``ahead`` [s]."""
-    return variance + foresight.diffusion * ahead
+    return variance + turn_prediction.diffusion * ahead
 
 
 @kernel
-def behind(foresight: Foresight, variance: float, ahead: float) -> float:
+def behind(turn_prediction: TurnPrediction, variance: float, ahead: float) -> float:
     """Time D [s] by which it is behind then."""
-    return held(foresight, variance, ahead) / foresight.diffusion
+    return held(turn_prediction, variance, ahead) / turn_prediction.diffusion
