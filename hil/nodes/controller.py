@@ -145,6 +145,8 @@ class ControllerNode:
         self.rows = rows_for(scenario.controller.max_age_s + scenario.controller.transport_s)
         is_told = SOURCES[scenario.controller.law] is TurnSource.TOLD
         leader = (self.topics.leader_cmd_vel,) if is_told else ()
+        self._estimate, self._command = self.topics.estimate, self.topics.command
+        self._cmd_vel = self.topics.cmd_vel
         orders = (self.topics.side,) if may_change else ()
         self.subscribes: tuple[str, ...] = (self.topics.estimate, topics.STOP, *leader, *orders)
         self._drive_type = drive_type(stamped=stamped)
@@ -174,7 +176,7 @@ class ControllerNode:
     ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
         """Take in an estimate, a stop or a tick; each leads to a command."""
         topic = event.topic
-        if topic == self.topics.estimate:
+        if topic == self._estimate:
             whole = in_little_endian(event.payload, _ESTIMATE)
             if not hear_estimate(state.lent, whole, event.signed_digest, now_ns):
                 refuse(state.lent, MALFORMED)
@@ -186,8 +188,9 @@ class ControllerNode:
         length = control(state.lent, _STOPS, now_ns)
         if not length:
             return state, ()
-        decision = Outgoing(self.topics.command, _COMMAND, self.decision.payload(length), now_ns)
-        drive = Outgoing(self.topics.cmd_vel, self._drive_type, self.drive.buffer.tobytes(), now_ns)
+        decided, driven = state.desk.decision[:length].tobytes(), state.desk.drive.tobytes()
+        decision = Outgoing(self._command, _COMMAND, decided, now_ns)
+        drive = Outgoing(self._cmd_vel, self._drive_type, driven, now_ns)
         if not is_due(state.next_diagnostics_ns, _DIAGNOSTICS_NS, now_ns):
             return state, (drive, decision)
         state.next_diagnostics_ns = now_ns + _DIAGNOSTICS_NS

@@ -104,6 +104,7 @@ class EstimatorNode:
             self.topics.odom: self._on_odometry,
             self.topics.sighting: self._on_sighting,
         }
+        self._estimate = self.topics.estimate
         self.subscribes = tuple(self._handlers)
 
     def begin(self, now_ns: int) -> EstimatorState:
@@ -174,7 +175,7 @@ class EstimatorNode:
     def _messages(self, state: EstimatorState, length: int, now_ns: int) -> tuple[Outgoing, ...]:
         """An estimate whose message has a length, and what is certain of it if that is asked for."""
         payload, capture_ns = state.memory.message(length)
-        estimate = Outgoing(self.topics.estimate, _ESTIMATE, payload, capture_ns)
+        estimate = Outgoing(self._estimate, _ESTIMATE, payload, capture_ns)
         if self.certifying is None:
             return (estimate,)
         newest = load(Estimate, state.memory.desk.newest, 0)

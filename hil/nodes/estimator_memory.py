@@ -184,7 +184,7 @@ class EstimatorMemory:
 
     def message(self, length: int) -> tuple[bytes, int]:
         """The message that a step has written, and the capture time that it speaks of."""
-        return self._template.payload(length), self._capture_ns.item(0)
+        return self.desk.buffer[:length].tobytes(), self._capture_ns.item(0)
 
     def estimate(self, now_ns: int) -> Told | None:
         """Newest estimate and why the newest measurement was not used; None before there is any."""
