@@ -68,7 +68,11 @@ def _run(chosen: Scenario, folder: Path, listen: str | None, *, lockstep: bool, 
     log_path = folder / "run.mcap"
     if log_path.exists():
         raise UsageError(f"{log_path} exists already; give another --out, or move it away")
-    failure = _lockstep(chosen, log_path) if lockstep else _live(chosen, folder, log_path, listen)
+    failure, timing = "", {}
+    if lockstep:
+        timing = {"lockstep": _lockstep(chosen, log_path)}
+    else:
+        failure = _live(chosen, folder, log_path, listen)
     if not log_path.exists():
         raise CheckFailedError(failure or "interrupted before anything was recorded")
     try:
@@ -76,7 +80,8 @@ def _run(chosen: Scenario, folder: Path, listen: str | None, *, lockstep: bool, 
             _make_whole(log_path)
         summary = _judge(log_path, folder)
         if as_json:
-            print_json(summary)
+            # How long it took is no part of the verdict, which is the same for every run of a seed.
+            print_json(summary | timing)
     finally:
         # Also if there is no room for a verdict, say: what went wrong first is what to tell.
         if failure:
@@ -89,19 +94,18 @@ def _folder(scenario: Scenario, out: Path | None) -> Path:
     return made_folder(out or Path("runs") / f"{scenario.name}-{time.strftime('%Y%m%d-%H%M%S')}")
 
 
-def _lockstep(scenario: Scenario, log_path: Path) -> str:
-    from hil.lockstep.run import make_nodes, run_lockstep
+def _lockstep(scenario: Scenario, log_path: Path) -> dict[str, float]:
+    from hil.lockstep.run import prepared, run_lockstep
 
-    nodes = make_nodes(scenario)
+    ready = prepared(scenario)
     begun = time.perf_counter()
-    run_lockstep(scenario, log_path, nodes)
+    run_lockstep(scenario, log_path, ready)
     took = time.perf_counter() - begun
+    times = scenario.run.duration_s / took
     click.echo(
-        f"{scenario.run.duration_s:g} s in lockstep in {took:.2f} s "
-        f"({scenario.run.duration_s / took:.0f} times real time)",
-        err=True,
+        f"{scenario.run.duration_s:g} s in lockstep in {took:.2f} s ({times:.0f} times real time)", err=True
     )
-    return ""
+    return {"wall_s": took, "times_real_time": times}
 
 
 def _live(scenario: Scenario, folder: Path, log_path: Path, listen: str | None) -> str:

@@ -52,5 +52,5 @@ class LabWriter:
 
     def drives(self, plant: Plant, stamp_ns: int) -> Outgoing:
         """What the leader is told to drive."""
-        payload = self._drives.write(plant.robot(0).goal, stamp_ns)
+        payload = self._drives.write(plant.leader_goal, stamp_ns)
         return Outgoing(self._drives_topic, self._drives.typename, payload, stamp_ns)

@@ -126,6 +126,7 @@ class Plant:
         self._stamped = topics_of(scenario).stamped
         self._drive_type = drive_type(stamped=self._stamped)
         self.memory = memory_of(scenario, poses)
+        self._leader_goal = columns_of(self.memory.robots)["goal"][0]
 
     def advance(self, until_ns: int) -> Happened:
         """Let the next thing happen that is due until a time."""
@@ -167,6 +168,11 @@ class Plant:
         """Whether the robots were stopped for good."""
         stopped: bool = self._now["stopped"].item()
         return stopped
+
+    @property
+    def leader_goal(self) -> Motion:
+        """What the leader is told to drive."""
+        return Motion(*self._leader_goal.item())
 
     def world(self) -> World:
         """The world as it is now."""

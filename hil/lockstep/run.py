@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from hil.emulator.node import EmulatorNode, EmulatorState
 from hil.errors import CheckFailedError
@@ -32,19 +32,31 @@ def make_nodes(scenario: Scenario) -> list[Node[Any]]:
     return [EmulatorNode(scenario), *map(estimator_node, links), *map(controller_node, links)]
 
 
-def run_lockstep(scenario: Scenario, log_path: Path, nodes: list[Node[Any]] | None = None) -> None:
+class Prepared(NamedTuple):
+    """A run that can begin: its nodes, and what its log says first."""
+
+    nodes: list[Node[Any]]
+    metadata: dict[str, dict[str, str]]
+
+
+def prepared(scenario: Scenario) -> Prepared:
+    """All that a run needs before it begins; making it loads and compiles whatever there is to."""
+    certificate = certificate_metadata(certificate_json(certificate_of(scenario)))
+    return Prepared(make_nodes(scenario), log_metadata(scenario, "lockstep") | certificate)
+
+
+def run_lockstep(scenario: Scenario, log_path: Path, ready: Prepared | None = None) -> None:
     """Run a scenario from the start barrier to standstill and write everything to ``log_path``.
 
-    ``nodes``: those of :func:`make_nodes`, if they have been made before. Raises :class:`CheckFailedError`
-    if the leader never sets off.
+    ``ready``: if it has been prepared before. Raises :class:`CheckFailedError` if the leader never sets off.
     """
-    certificate = certificate_metadata(certificate_json(certificate_of(scenario)))
-    with LogWriter(log_path, log_metadata(scenario, "lockstep") | certificate) as log:
+    nodes, metadata = ready or prepared(scenario)
+    with LogWriter(log_path, metadata) as log:
 
         def record(message: Outgoing, now_ns: int) -> None:
             log.write(message.topic, message.typename, message.payload, now_ns, now_ns)
 
-        lockstep = Lockstep(nodes or make_nodes(scenario), record)
+        lockstep = Lockstep(nodes, record)
         # What was imported and built so far stays for good: the collector need not walk it again and again.
         gc.freeze()
         since_ns = _wait_for_motion(lockstep)
