@@ -26,6 +26,8 @@ from typing import (
 import numpy as np
 from numpy.typing import NDArray
 
+from formation.kernel import compiles
+
 R = TypeVar("R")
 
 Vector = Annotated[NDArray[np.float64], np.float64, 1]
@@ -124,9 +126,11 @@ def row_of(record: R) -> Rows[R]:
 def lent(record: R) -> Rows[R]:
     """One row that holds a named tuple of rows and arrays by where these lie, for an entry to work in all.
 
-    The row keeps none of them alive: whoever made them holds on to ``record`` as long. In plain Python a
-    list of the record itself does as well.
+    The row keeps none of them alive: whoever made them holds on to ``record`` as long. Where entries are
+    plain Python, they get the record itself, in a list.
     """
+    if not compiles():
+        return cast("Rows[R]", [record])
     rows = rows_of(type(record), 1)
     columns_of(rows)[0] = _spans(record)
     return rows

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import cast
-
 from controllers.follower import Command
 from controllers.station_keeper import StationState, at_station
 from estimation.tracking.prediction import SentCommand, Sight, rows_for
 from estimation.tracking.tracker import Status
-from formation.kernel import compiles
-from formation.records import Rows, columns_of, copy_of, lent, load, row_of, rows_of, store
+from formation.records import columns_of, copy_of, lent, load, row_of, rows_of, store
 from formation.ring import place
 from formation.station import Side
 from hil.nodes.control_rules import control_rules
@@ -60,7 +57,7 @@ class ControllerState:
 
     def __init__(self, desk: Desk, next_diagnostics_ns: int) -> None:
         self.desk = desk
-        self.lent = lent(desk) if compiles() else cast("Rows[Desk]", [desk])
+        self.lent = lent(desk)
         self.next_diagnostics_ns = next_diagnostics_ns
         self._due_ns = columns_of(desk.control)["next_tick_ns"]
 
