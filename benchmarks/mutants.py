@@ -132,7 +132,7 @@ def main() -> int:
         each.replace(".", "/") + ".py" if not each.endswith(".py") else each for each in arguments.module
     ]
     if arguments.interpreted:
-        os.environ["NUMBA_DISABLE_JIT"] = "1"
+        os.environ["ABREAST_INTERPRETED"] = "1"
     _forks.set_forkserver_preload(HEAVY)
     scores = []
     with tempfile.TemporaryDirectory(prefix="mutants") as folder:
