@@ -184,6 +184,33 @@ def test_an_edit_in_an_imported_kernel_recompiles_and_nothing_else_does(tmp_path
     assert run(LEAF.format(weight="5.0")) == "10.0 0"
 
 
+LINKING_TOP = """from __future__ import annotations
+import sys
+from formation.kernel import entry
+from formation.leaf_of_a_test import weighed
+@entry
+def below(x: float) -> float:
+    return weighed(x) + 1.0
+@entry
+def answer(x: float) -> float:
+    return below(x)
+print(answer(2.0), *(sum(each.stats.cache_hits.values()) for each in (below, answer)))
+print("scipy.linalg" in sys.modules)
+"""
+
+
+def test_an_entry_out_of_the_cache_can_be_linked_and_only_compiling_loads_the_whole_compiler(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    run = house_of_a_test(tmp_path, LINKING_TOP)
+    assert run(LEAF.format(weight="3.0")).split() == ["7.0", "0", "0", "True"]
+    assert run(LEAF.format(weight="3.0")).split() == ["7.0", "1", "1", "False"]
+    for kept in tmp_path.rglob("*.answer-*"):
+        kept.unlink()
+    assert run(LEAF.format(weight="3.0")).split() == ["7.0", "1", "0", "True"]
+
+
 RECORD = """from typing import NamedTuple
 from formation.kernel import kernel
 class {name}(NamedTuple):
