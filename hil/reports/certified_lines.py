@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from bokeh.plotting import figure
 
 from hil.figures.shown import Shown
+from hil.reports.plot_models import Figure
 from hil.reports.plots import PURPLE, Key, draw_line, table
 
 _CERTIFIED = ("v1", "alpha1")
@@ -20,7 +20,7 @@ def largest_radius(shown: Shown, quantity: str) -> float | None:
     return float(np.max(known)) if len(known) else None
 
 
-def draw_certified(plot: figure, shown: Shown, quantity: str, *, of_error: bool) -> Key:
+def draw_certified(plot: Figure, shown: Shown, quantity: str, *, of_error: bool) -> Key:
     """Dashed lines at the radius to both sides of the estimate, or of zero in a plot of its error."""
     columns = shown.certified
     radius = getattr(columns, f"radius_{quantity}")
