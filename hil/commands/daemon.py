@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from hil.commands.collector import collector_paused
 from hil.commands.seconds import DURATION
 from hil.errors import UsageError
 from hil.live.daemon import Ending, NodeWorker, Worker, run_daemon
@@ -70,7 +71,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
 
         prepare(types_of(chosen).values())
         dropped = run_daemon(
-            lambda: _WORKERS[name](order),
+            collector_paused()(lambda: _WORKERS[name](order)),
             urgent_topics(chosen),
             endpoints,
             ending,

@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from hil.commands.collector import collector_paused
 from hil.commands.seconds import DURATION
 from hil.errors import CheckFailedError, UsageError
 from hil.log.report_json import print_json
@@ -89,6 +90,7 @@ def _folder(scenario: Scenario, out: Path | None) -> Path:
     return made_folder(out or Path("runs") / f"{scenario.name}-{time.strftime('%Y%m%d-%H%M%S')}")
 
 
+@collector_paused()
 def _lockstep(scenario: Scenario, log_path: Path) -> str:
     from hil.lockstep.run import make_nodes, run_lockstep
 
@@ -149,6 +151,7 @@ def _make_whole(log_path: Path) -> None:
         )
 
 
+@collector_paused()
 def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
     """Judge the log, leave summary, picture and report beside it, and print the verdict."""
     from hil.judge.summary_text import print_summary
