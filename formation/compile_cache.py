@@ -20,6 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from numba.core import caching
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompileResult
+from numba.core.runtime import rtsys
 
 _ROOT = Path(__file__).resolve().parent.parent
 _HOUSE = "formation|controllers|estimation|hil|abreast"
@@ -132,16 +135,43 @@ class _Locator(caching._CacheLocator):
         return cls(function, file)
 
 
+class _LoadedLibrary(JITCodeLibrary):
+    """Machine code of an entry out of the cache, without the bitcode that only who links it would need."""
+
+    @classmethod
+    def of(cls, codegen: Any, name: str, machine_code: bytes) -> _LoadedLibrary:
+        """Library that is ready to run, under the name that it had where it was compiled."""
+        library = cls(codegen, name)
+        library.enable_object_caching()
+        library._set_compiled_object(machine_code)
+        library._finalize_final_module()
+        return library
+
+
 class _CacheImpl(caching.CompileResultCacheImpl):
     _locator_classes = (_Locator,)
+
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        """As numba does it, but for the bitcode, which takes longest to read: nobody links an entry."""
+        (name, _, (machine_code, _)), description, *rest = payload
+        codegen = target_context.codegen()
+        library = _LoadedLibrary.of(codegen, name, machine_code)
+        codegen._engine._defined_symbols.add(description.llvm_cpython_wrapper_name)
+        codegen.unserialize_library = lambda loaded: loaded
+        try:
+            return CompileResult._rebuild(target_context, library, description, *rest)
+        finally:
+            del codegen.unserialize_library
 
 
 class _Cache(caching.FunctionCache):
     _impl_class = _CacheImpl
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
+        """As numba does it, but without all that it teaches itself before it compiles: half a second."""
+        rtsys.initialize(target_context)
         try:
-            return super().load_overload(signature, target_context)
+            return self._load_overload(signature, target_context)
         except (AttributeError, ImportError, TypeError, EOFError, pickle.UnpicklingError):
             # It names what is gone by now, a record that was renamed say, or was torn: as if there were none.
             self.flush()

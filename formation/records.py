@@ -26,8 +26,6 @@ from typing import (
 import numpy as np
 from numpy.typing import NDArray
 
-from formation.kernel import compiles
-
 R = TypeVar("R")
 
 Vector = Annotated[NDArray[np.float64], np.float64, 1]
@@ -121,25 +119,6 @@ def row_of(record: R) -> Rows[R]:
     rows = rows_of(type(record), 1)
     store(rows, 0, record)
     return rows
-
-
-def lent(record: R) -> Rows[R]:
-    """One row that holds a named tuple of rows and arrays by where these lie, for an entry to work in all.
-
-    The row keeps none of them alive: whoever made them holds on to ``record`` as long. Where entries are
-    plain Python, they get the record itself, in a list.
-    """
-    if not compiles():
-        return cast("Rows[R]", [record])
-    rows = rows_of(type(record), 1)
-    columns_of(rows)[0] = _spans(record)
-    return rows
-
-
-def _spans(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return value.__array_interface__["data"][0], len(value)
-    return tuple(map(_spans, value)) if isinstance(value, tuple) else value
 
 
 def copy_of(rows: Rows[R]) -> Rows[R]:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import click
 
 from hil import __version__
+from hil.commands.collector import collector_paused
 from hil.errors import AbreastError
 
 COMMANDS = {
@@ -39,13 +40,14 @@ class _LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        if cmd_name in _DAEMONS:
-            from hil.commands.daemon import daemon_command
+        with collector_paused():
+            if cmd_name in _DAEMONS:
+                from hil.commands.daemon import daemon_command
 
-            return daemon_command(cmd_name, COMMANDS[cmd_name])
-        module = importlib.import_module(f"hil.commands.{_MODULES.get(cmd_name, cmd_name)}")
-        command: click.Command = module.command
-        return command
+                return daemon_command(cmd_name, COMMANDS[cmd_name])
+            module = importlib.import_module(f"hil.commands.{_MODULES.get(cmd_name, cmd_name)}")
+            command: click.Command = module.command
+            return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):

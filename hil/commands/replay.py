@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from hil.commands.collector import collector_paused
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
 from hil.log.report_json import print_json
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 )
 @click.option("--certify", is_flag=True, help="Judge a guaranteed error radius of every estimate too.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object on stdout.")
+@collector_paused()
 def command(
     log: Path,
     verify: bool,

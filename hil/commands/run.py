@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from hil.commands.collector import collector_paused
 from hil.commands.seconds import DURATION
 from hil.errors import CheckFailedError, UsageError
 from hil.log.report_json import print_json
@@ -94,6 +95,7 @@ def _folder(scenario: Scenario, out: Path | None) -> Path:
     return made_folder(out or Path("runs") / f"{scenario.name}-{time.strftime('%Y%m%d-%H%M%S')}")
 
 
+@collector_paused()
 def _lockstep(scenario: Scenario, log_path: Path) -> dict[str, float]:
     from hil.lockstep.run import prepared, run_lockstep
 
@@ -153,6 +155,7 @@ def _make_whole(log_path: Path) -> None:
         )
 
 
+@collector_paused()
 def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
     """Judge the log, leave summary, picture and report beside it, and print the verdict."""
     from hil.judge.summary_text import print_summary

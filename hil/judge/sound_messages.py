@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import fields
+from operator import attrgetter
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +15,10 @@ from hil.wire.message_types import CertifiedEstimate, Command, LeaderEstimate, M
 from hil.wire.messages import MalformedPayloadError, to_ns
 
 _LARGEST = 1e12
+_ALL_OF: Mapping[type, attrgetter[Any]] = {
+    kind: attrgetter(*(field.name for field in fields(kind))) for kind in (CertifiedEstimate, Command, Truth)
+}
+_NUMBERS = attrgetter(*QUANTITIES, "rho", "alpha2", "v2", "u2")
 
 
 def is_sound(message: Message) -> bool:
@@ -24,7 +30,7 @@ def is_sound(message: Message) -> bool:
             Status(message.status)
             return _can_be(message)
         if isinstance(message, CertifiedEstimate | Command | Truth):
-            values = [getattr(message, field.name) for field in fields(message)]
+            values = _ALL_OF[type(message)](message)
             return not any(isinstance(each, float) and abs(each) > _LARGEST for each in values)
     except (MalformedPayloadError, ValueError):
         return False
@@ -33,9 +39,9 @@ def is_sound(message: Message) -> bool:
 
 def _can_be(estimate: LeaderEstimate) -> bool:
     """Whether an estimate's numbers are such as a sound estimator gives; deviations may be unknown (NaN)."""
-    numbers = [getattr(estimate, name) for name in (*QUANTITIES, "rho", "alpha2", "v2", "u2")]
-    variances = estimate.covariance[~np.isnan(estimate.covariance)]
-    return all(abs(number) < _LARGEST for number in numbers) and bool(np.all(np.abs(variances) < _LARGEST))
+    if not all(-_LARGEST < number < _LARGEST for number in _NUMBERS(estimate)):
+        return False
+    return not (np.abs(estimate.covariance) >= _LARGEST).any()
 
 
 def _stamps(message: Message) -> Iterator[Time]:

@@ -6,7 +6,8 @@ from controllers.follower import Command
 from controllers.station_keeper import StationState, at_station
 from estimation.tracking.prediction import SentCommand, Sight, rows_for
 from estimation.tracking.tracker import Status
-from formation.records import columns_of, copy_of, lent, load, row_of, rows_of, store
+from formation.lending import lent
+from formation.records import columns_of, copy_of, load, row_of, rows_of, store
 from formation.ring import place
 from formation.station import Side
 from hil.nodes.control_rules import control_rules

@@ -20,7 +20,8 @@ from estimation.tracking.track import Track, as_filter
 from estimation.tracking.track_point import TrackPoint
 from estimation.tracking.tracker import Status
 from formation.kernel import compiles
-from formation.records import R, Rows, columns_of, lent, load, plain_rows_of, row_of, rows_of, store
+from formation.lending import lent
+from formation.records import R, Rows, columns_of, load, plain_rows_of, row_of, rows_of, store
 from formation.ring import Ring, place
 from hil.nodes.counting import Count, counts_in
 from hil.nodes.estimator_desk import (

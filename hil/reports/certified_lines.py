@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from bokeh.plotting import figure
 
 from hil.figures.plot_data import PlotData
+from hil.reports.plot_models import Figure
 from hil.reports.plots import PURPLE, Key, draw_line, table
 
 _CERTIFIED = ("v1", "alpha1")
@@ -20,7 +20,7 @@ def largest_radius(data: PlotData, quantity: str) -> float | None:
     return float(np.max(known)) if len(known) else None
 
 
-def draw_certified(plot: figure, data: PlotData, quantity: str, *, of_error: bool) -> Key:
+def draw_certified(plot: Figure, data: PlotData, quantity: str, *, of_error: bool) -> Key:
     """Dashed lines at the radius to both sides of the estimate, or of zero in a plot of its error."""
     columns = data.certified
     radius = getattr(columns, f"radius_{quantity}")

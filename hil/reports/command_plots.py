@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from bokeh.models import ColumnDataSource
-from bokeh.models.glyphs import Quad
-from bokeh.plotting import figure
 
 from formation.angles import FloatArray
 from hil.figures.plot_data import LONGEST_LINE, PlotData
 from hil.judge.columns import inside
 from hil.reports.intervals import TimeInterval, intervals_of
+from hil.reports.plot_models import Field, Figure, Model, Value, source_of
 from hil.reports.plots import (
     FOLLOWER,
     GREY,
@@ -20,7 +18,6 @@ from hil.reports.plots import (
     Key,
     Panel,
     TimeAxis,
-    draw,
     draw_level,
     draw_line,
     hover,
@@ -78,15 +75,15 @@ def _panel(
     return Panel(f"Commanded {what} {symbol}", f"The follower's {what} as commanded.", tuple(keys), plot)
 
 
-def _shade(plot: figure, stops: Sequence[TimeInterval], y: tuple[float, float]) -> None:
+def _shade(plot: Figure, stops: Sequence[TimeInterval], y: tuple[float, float]) -> None:
     held = {
         "left": [interval.from_s for interval in stops],
         "right": [interval.to_s for interval in stops],
         "why": [interval.what for interval in stops],
     }
-    area = Quad(
-        left="left", right="right", bottom=y[0], top=y[1],
-        fill_color=GREY, fill_alpha=0.3, line_color=GREY, line_alpha=0.6,
-    )  # fmt: skip
+    sides = {"left": Field("left"), "right": Field("right"), "bottom": Value(y[0]), "top": Value(y[1])}
+    looks = {"fill_color": Value(GREY), "fill_alpha": Value(0.3)}
+    edge = {"line_color": Value(GREY), "line_alpha": Value(0.6)}
+    area = Model("Quad", **sides, **looks, **edge)
     tips = {"stands": "@why", "from": "@left{0.00} s", "to": "@right{0.00} s"}
-    hover(plot, draw(plot, ColumnDataSource(held), area), tips, mode="mouse")
+    hover(plot, plot.add_glyph(source_of(held), area), tips, mode="mouse")

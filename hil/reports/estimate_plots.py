@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from bokeh.plotting import figure
 from numpy.typing import NDArray
 
 from estimation.tracking.estimate import QUANTITIES
@@ -15,6 +14,7 @@ from hil.judge.columns import EstimateColumns, inside
 from hil.judge.estimation import errors_at
 from hil.reports.certified_lines import draw_certified, largest_radius
 from hil.reports.decimation import decimated_rows
+from hil.reports.plot_models import Figure
 from hil.reports.plots import (
     BELIEVED,
     BOUND,
@@ -188,7 +188,7 @@ def _range(bound: FloatArray, unit: str) -> str:
     return f"{low:.3g} {unit}" if f"{low:.3g}" == f"{high:.3g}" else f"{low:.3g} to {high:.3g} {unit}"
 
 
-def _mark(plot: figure, t: FloatArray, error: FloatArray, height: float) -> None:
+def _mark(plot: Figure, t: FloatArray, error: FloatArray, height: float) -> None:
     """Crosses at samples that violate their bound; those beyond the picture at its edge."""
     rows = decimated_rows(error)
     drawn_at = np.clip(error[rows], -0.97 * height, 0.97 * height)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from bokeh.models import ColumnDataSource
-from bokeh.models.glyphs import HBar
 
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
@@ -14,6 +12,7 @@ from hil.figures.plot_data import LONGEST_LINE, PlotData
 from hil.judge.columns import inside
 from hil.reports.decimation import decimated_rows
 from hil.reports.intervals import intervals_of
+from hil.reports.plot_models import Field, Model, Value, source_of
 from hil.reports.plots import (
     BELIEVED,
     BOUND,
@@ -23,7 +22,6 @@ from hil.reports.plots import (
     Key,
     Panel,
     TimeAxis,
-    draw,
     draw_level,
     draw_line,
     draw_marks,
@@ -55,7 +53,7 @@ def status_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
     occurring = [status for status in Status if status in statuses]
     rows = [status.name.lower() for status in reversed(occurring)]
     plot = axis.panel("", rows, _AXIS_HEIGHT + _ROW_HEIGHT * len(rows))
-    plot.min_border_left = 78
+    plot.set(min_border_left=78)
     for status in occurring:
         own = [interval for interval in intervals if interval.what == status.name.lower()]
         held = {
@@ -65,10 +63,9 @@ def status_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
             "count": [interval.count for interval in own],
         }
         colour = _STATUS_COLOURS[status]
-        bar = HBar(
-            y="row", left="from", right="to", height=0.6, fill_color=colour, line_color=colour, line_width=1.5
-        )
-        bars = draw(plot, ColumnDataSource(held), bar)
+        place = {"y": Field("row"), "left": Field("from"), "right": Field("to"), "height": Value(0.6)}
+        looks = {"fill_color": Value(colour), "line_color": Value(colour), "line_width": Value(1.5)}
+        bars = plot.add_glyph(source_of(held), Model("HBar", **place, **looks))
         tips = {"status": "@row", "from": "@from{0.00} s", "to": "@to{0.00} s", "estimates": "@count"}
         hover(plot, bars, tips, mode="mouse")
     shares = ", ".join(f"{s.name.lower()} {statuses.count(s) / len(statuses):.1%}" for s in occurring)
@@ -98,7 +95,7 @@ def nis_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
     ]
     if np.any(over):
         held = {"t": t[over], "y": np.full(np.count_nonzero(over), 0.96 * top), "nis": nis[over]}
-        beyond = draw_marks(plot, ColumnDataSource(held), "triangle", BOUND, 8.0)
+        beyond = draw_marks(plot, source_of(held), "triangle", BOUND, 8.0)
         hover(plot, beyond, {"t": "@t{0.00} s", "NIS": "@nis{0.0}"}, mode="mouse")
         keys.append(Key("beyond the picture", BOUND, "triangle"))
     says = "How far each measurement lay from what was expected, squared and in units of its own variance."

@@ -9,12 +9,10 @@ from html import escape
 from typing import Any
 
 import numpy as np
-from bokeh.models import ColumnDataSource
-from bokeh.models.glyphs import Rect, Text
-from bokeh.models.ranges import FactorRange
 from bokeh.palettes import Cividis256
 
-from hil.reports.plots import DARK, Panel, blank, draw, hover
+from hil.reports.plot_models import Field, Model, Value, source_of
+from hil.reports.plots import DARK, Panel, blank, hover
 from hil.reports.run_tables import QUANTITIES, scale_of
 
 Cell = Mapping[str, Any]
@@ -150,20 +148,19 @@ def _map(
         height=_HEIGHT_OF_REST + max(_HEIGHT_OF_ROW * len(rows), _HEIGHT_OF_LABEL),
         x_label="heading noise [deg]",
         y_label="position noise [mm]",
-        tools="",
-        x_range=FactorRange(factors=list(columns)),
-        y_range=FactorRange(factors=list(rows)),
+        x_range=Model("FactorRange", factors=list(columns)),
+        y_range=Model("FactorRange", factors=list(rows)),
     )
-    plot.toolbar_location = None
-    plot.grid.grid_line_color = None
-    source = ColumnDataSource(dict(data))
-    area = Rect(x="column", y="row", width=0.96, height=0.92, fill_color="fill", line_color=None)
-    hover(plot, draw(plot, source, area), {estimator: "@tip"}, mode="mouse")
-    letters = Text(
-        x="column", y="row", text="text", text_color="ink",
-        text_align="center", text_baseline="middle", text_font_size="12px",
-    )  # fmt: skip
-    draw(plot, source, letters)
+    plot.set(toolbar_location=None)
+    for grid in plot.grids:
+        grid.set(grid_line_color=None)
+    source, place = source_of(data), {"x": Field("column"), "y": Field("row")}
+    size = {"width": Value(0.96), "height": Value(0.92)}
+    area = Model("Rect", **place, **size, fill_color=Field("fill"), line_color=Value(None))
+    hover(plot, plot.add_glyph(source, area), {estimator: "@tip"}, mode="mouse")
+    centred = {"text_align": Value("center"), "text_baseline": Value("middle")}
+    font = {"text_color": Field("ink"), "text_font_size": Value("12px")}
+    plot.add_glyph(source, Model("Text", **place, text=Field("text"), **centred, **font))
     says = f"{merit.title} of {estimator} over position and heading noise."
     return Panel(estimator, says, (), plot)
 

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import Any
-
-from bokeh.core.json_encoder import serialize_json
-from bokeh.document import Document
-from bokeh.plotting import figure
-from bokeh.resources import Resources
 
 from hil.reports.page_style import STYLE
+from hil.reports.plot_models import Figure, bokeh_script, document_of
 from hil.reports.plots import Key, Panel
 
 _DOCUMENT = "plots"
@@ -115,23 +111,18 @@ def _swatch(key: Key) -> str:
     return f'<span aria-hidden="true" style="{_SWATCHES[key.style].format(key.colour)}"></span>'
 
 
-def _plots(plots: Mapping[str, figure]) -> str:
-    """Bokeh's own code, the plots as data, and the call that draws them in their places.
-
-    Bokeh's own templates draw names by lot; here the page of the same run is the same.
-    """
-    document = Document()
-    with document.models.freeze():  # else every plot added looks through all before it
-        for plot in plots.values():
-            document.add_root(plot)
-    embedded: dict[str, Any] = {_DOCUMENT: document.to_json(deferred=False)}
-    items = [{"docid": _DOCUMENT, "roots": {plot.id: place for place, plot in plots.items()}}]
-    items[0]["root_ids"] = [plot.id for plot in plots.values()]
-    library = "\n".join(Resources(mode="inline", components=["bokeh"], log_level="warn").js_raw)
-    data = serialize_json(embedded).replace("</", "<\\/")
-    call = _DRAW % serialize_json(items)
+def _plots(plots: Mapping[str, Figure]) -> str:
+    """Bokeh's own code, the plots as data, and the call that draws them in their places."""
+    document, numbers = document_of(list(plots.values()))
+    item = {"docid": _DOCUMENT, "roots": dict(zip(numbers, plots, strict=True)), "root_ids": numbers}
+    data = _json({_DOCUMENT: document}).replace("</", "<\\/")
     return (
         "<noscript><p>The plots need JavaScript; the tables above do not.</p></noscript>\n"
-        f"<script>{library}</script>\n"
-        f'<script type="application/json" id="{_DOCUMENT}">{data}</script>\n<script>{call}</script>\n'
+        f'<script>{bokeh_script()}\nBokeh.set_log_level("warn");</script>\n'
+        f'<script type="application/json" id="{_DOCUMENT}">{data}</script>\n'
+        f"<script>{_DRAW % _json([item])}</script>\n"
     )
+
+
+def _json(value: object) -> str:
+    return json.dumps(value, separators=(",", ":"), allow_nan=False)

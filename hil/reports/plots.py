@@ -5,27 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from bokeh.models import ColumnDataSource, CrosshairTool, HoverTool
-from bokeh.models.annotations import PolyAnnotation, Span
-from bokeh.models.glyph import Glyph
-from bokeh.models.glyphs import Line, Scatter, VArea
-from bokeh.models.ranges import FactorRange, Range, Range1d
-from bokeh.models.renderers import GlyphRenderer
-from bokeh.plotting import figure
 
 from formation.angles import FloatArray
 from hil.figures.plot_data import LONGEST_LINE
 from hil.reports.decimation import decimated_rows
+from hil.reports.plot_models import DASHES, Field, Figure, Model, Value, source_of
 
 # Colours of Okabe and Ito, told apart by eyes of every kind; bounds and limits differ by their dashes, too.
 BLUE, VERMILION, PURPLE, DARK, GREY = "#0072b2", "#d55e00", "#a8478a", "#333333", "#767676"
 LEADER, FOLLOWER, BELIEVED, BOUND, ORBIT, TRUE, LIMIT = BLUE, VERMILION, BLUE, VERMILION, PURPLE, DARK, GREY
 
 HEIGHT = 210
-_TOOLS = "xpan,xbox_zoom,reset"
 _FONT = "system-ui, sans-serif"
 
 
@@ -45,7 +38,7 @@ class Panel:
     title: str
     says: str
     keys: tuple[Key, ...]
-    plot: figure
+    plot: Figure
     tall: bool = False
 
 
@@ -57,125 +50,127 @@ class TimeAxis:
 
     def __init__(self, first: float, last: float, judged_from: float) -> None:
         self.first, self.last, self.judged_from = first, last, judged_from
-        self._range = Range1d(start=first, end=last if last > first else first + 1.0)
-        self._cursor = Span(dimension="height", line_color=GREY, line_width=1, line_dash="dotted")
+        self._range = Model("Range1d", start=first, end=last if last > first else first + 1.0)
+        self._cursor = Model("Span", dimension="height", line_color=GREY, line_dash=DASHES["dotted"])
 
-    def panel(self, y_label: str, y: tuple[float, float] | Sequence[str], height: int = HEIGHT) -> figure:
+    def panel(self, y_label: str, y: tuple[float, float] | Sequence[str], height: int = HEIGHT) -> Figure:
         """An empty plot over this time; ``y``: its limits, or the names of its rows."""
-        limits = Range1d(start=y[0], end=y[1]) if isinstance(y, tuple) else FactorRange(factors=list(y))
-        plot = blank(
-            height=height, x_range=self._range, y_range=limits, tools=_TOOLS, x_label="t [s]", y_label=y_label
+        if isinstance(y, tuple):
+            limits = Model("Range1d", start=y[0], end=y[1])
+        else:
+            limits = Model("FactorRange", factors=list(y))
+        plot = blank(height=height, x_range=self._range, y_range=limits, x_label="t [s]", y_label=y_label)
+        plot.add_tools(
+            Model("PanTool", dimensions="width"),
+            Model("BoxZoomTool", dimensions="width"),
+            Model("ResetTool"),
+            Model("CrosshairTool", overlay=self._cursor),
         )
-        plot.add_tools(CrosshairTool(overlay=self._cursor))
         if self.judged_from > self.first and isinstance(y, tuple):
             across = [self.first, self.judged_from, self.judged_from, self.first]
             up = [y[0], y[0], y[1], y[1]]
-            shade = PolyAnnotation(
-                xs=across, ys=up, fill_color="#000000", fill_alpha=0.04, line_alpha=0.0, level="image"
-            )
-            plot.add_layout(shade)
+            looks = {"fill_color": "#000000", "fill_alpha": 0.04, "line_alpha": 0.0, "level": "image"}
+            plot.add_layout(Model("PolyAnnotation", xs=across, ys=up, **looks))
         return plot
 
 
-def blank(*, height: int, x_label: str, y_label: str, tools: str, x_range: Range, y_range: Range) -> figure:
+def blank(*, height: int, x_label: str, y_label: str, x_range: Model, y_range: Model) -> Figure:
     """An empty plot in the style of the page, as wide as it may be. No tool takes a finger's scrolling."""
-    plot = figure(
-        title=None,
+    plot = Figure(
         height=height,
+        x_range=x_range,
+        y_range=y_range,
+        x_label=x_label,
+        y_label=y_label,
         min_width=240,  # a first layout without any width would leave traces of its labels
         sizing_mode="stretch_width",
-        tools=tools,
-        active_drag=None,
-        active_scroll=None,
         toolbar_location="above",
         background_fill_color=None,
         border_fill_color=None,
         outline_line_color=None,
         min_border_left=58,
         min_border_right=12,
-        x_range=x_range,
-        y_range=y_range,
     )
-    plot.toolbar.logo = None
-    plot.xaxis.axis_label, plot.yaxis.axis_label = x_label, y_label
-    for axis in plot.axis:
-        axis.axis_label_text_font_style = "normal"
-        axis.axis_label_text_font = axis.major_label_text_font = _FONT
-        axis.axis_label_text_font_size = axis.major_label_text_font_size = "12px"
-        axis.axis_label_text_color = axis.major_label_text_color = DARK
-        axis.axis_label_standoff = 4
-        axis.axis_line_color = "#bbbbbb"
-        axis.minor_tick_line_color = None
-    plot.grid.grid_line_color = "#e4e4e4"
+    for axis in (plot.x_axis, plot.y_axis):
+        axis.set(
+            axis_label_text_font_style="normal",
+            axis_label_text_font=_FONT,
+            major_label_text_font=_FONT,
+            axis_label_text_font_size="12px",
+            major_label_text_font_size="12px",
+            axis_label_text_color=DARK,
+            major_label_text_color=DARK,
+            axis_label_standoff=4,
+            axis_line_color="#bbbbbb",
+            minor_tick_line_color=None,
+        )
+    for grid in plot.grids:
+        grid.set(grid_line_color="#e4e4e4")
     return plot
 
 
-def table(t: FloatArray, by: FloatArray, columns: Mapping[str, FloatArray]) -> ColumnDataSource:
+def table(t: FloatArray, by: FloatArray, columns: Mapping[str, FloatArray]) -> Model:
     """Columns over time, decimated by the peaks of ``by`` and broken where the time jumps."""
     holes = np.flatnonzero(np.diff(t) > LONGEST_LINE) + 1
     rows = decimated_rows(np.insert(by, holes, math.nan))
     decimated = {name: np.insert(values, holes, math.nan)[rows] for name, values in columns.items()}
-    return ColumnDataSource(
+    return source_of(
         {"t": np.insert(t, holes, t[holes])[rows]} | {k: _short(v) for k, v in decimated.items()}
     )
 
 
-def marks(t: FloatArray, values: FloatArray) -> ColumnDataSource:
+def marks(t: FloatArray, values: FloatArray) -> Model:
     """Single points as they are."""
-    return ColumnDataSource({"t": t, "y": _short(values)})
+    return source_of({"t": t, "y": _short(values)})
 
 
 def draw_line(
-    plot: figure,
-    source: ColumnDataSource,
+    plot: Figure,
+    source: Model,
     column: str,
     colour: str,
     *,
     dash: str = "solid",
     width: float = 1.3,
-) -> GlyphRenderer[Any]:
+) -> Model:
     """One column of a table as a line."""
-    return draw(plot, source, Line(x="t", y=column, line_color=colour, line_dash=dash, line_width=width))
+    looks = {"line_color": colour, "line_dash": DASHES[dash], "line_width": width}
+    return plot.add_glyph(source, Model("Line", x=Field("t"), y=Field(column), **looks))
 
 
-def draw_band(plot: figure, source: ColumnDataSource, low: str, high: str, colour: str) -> None:
+def draw_band(plot: Figure, source: Model, low: str, high: str, colour: str) -> None:
     """What lies between two columns, filled."""
-    draw(plot, source, VArea(x="t", y1=low, y2=high, fill_color=colour, fill_alpha=0.18))
+    area = Model("VArea", x=Field("t"), y1=Field(low), y2=Field(high), fill_color=colour, fill_alpha=0.18)
+    plot.add_glyph(source, area)
 
 
-def draw_level(plot: figure, value: float, colour: str, dash: str) -> None:
+def draw_level(plot: Figure, value: float, colour: str, dash: str) -> None:
     """A level line from edge to edge."""
-    plot.add_layout(
-        Span(location=value, dimension="width", line_color=colour, line_dash=dash, line_width=1.2)
-    )
+    looks = {"line_color": colour, "line_dash": DASHES[dash], "line_width": 1.2}
+    plot.add_layout(Model("Span", location=value, dimension="width", **looks))
 
 
-def draw_marks(
-    plot: figure, source: ColumnDataSource, marker: str, colour: str, size: float
-) -> GlyphRenderer[Any]:
+def draw_marks(plot: Figure, source: Model, marker: str, colour: str, size: float) -> Model:
     """Points as markers: dots small, crosses in the colour of what was violated."""
-    width = 1.6 if marker == "x" else 0.0
-    glyph = Scatter(
-        x="t", y="y", marker=marker, size=size, line_color=colour, fill_color=colour, line_width=width
-    )
-    return draw(plot, source, glyph)
-
-
-def draw(plot: figure, source: ColumnDataSource, glyph: Glyph) -> GlyphRenderer[Any]:
-    """A glyph as it is, without the costly copies for selections that ``plot.line`` and its like make."""
-    drawn: GlyphRenderer[Any] = plot.add_glyph(source, glyph)
-    return drawn
+    looks = {
+        "marker": Value(marker),
+        "size": Value(size),
+        "line_color": Value(colour),
+        "fill_color": Value(colour),
+        "line_width": Value(1.6 if marker == "x" else 0.0),
+    }
+    return plot.add_glyph(source, Model("Scatter", x=Field("t"), y=Field("y"), **looks))
 
 
 def hover(
-    plot: figure,
-    over: GlyphRenderer[Any],
+    plot: Figure,
+    over: Model,
     tips: Mapping[str, str],
     *,
     mode: Literal["mouse", "vline"] = "vline",
 ) -> None:
     """Show the values under the pointer: labels with Bokeh's fields."""
-    plot.add_tools(HoverTool(renderers=[over], mode=mode, tooltips=list(tips.items())))
+    plot.add_tools(Model("HoverTool", renderers=[over], mode=mode, tooltips=list(tips.items())))
 
 
 def limits_around(

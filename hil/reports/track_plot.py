@@ -5,20 +5,19 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from bokeh.models import BasicTicker, ColumnDataSource
-from bokeh.models.ranges import DataRange1d
-from bokeh.plotting import figure
 
 from formation.angles import FloatArray
 from hil.figures.plot_data import PlotData, with_gaps
 from hil.judge.columns import inside
 from hil.reports.decimation import MOST_POINTS, spread_rows
+from hil.reports.plot_models import Field, Figure, Model, Value, source_of
 from hil.reports.plots import FOLLOWER, GREY, LEADER, Key, Panel, blank, hover
 
 _HEIGHT = 460
 _MOMENTS = 7
 _MARK_SHARE = 0.03
 """Half length of a robot's mark over the extent of the tracks."""
+_OUTLINE = {"xs": Field("xs"), "ys": Field("ys")}
 _MARK = np.array([(1.0, 0.0), (-0.7, 0.62), (-0.4, 0.0), (-0.7, -0.62)])
 
 
@@ -34,22 +33,19 @@ def track_panel(data: PlotData) -> Panel | None:
         height=_HEIGHT,
         x_label="x [m]",
         y_label="y [m]",
-        tools="pan,wheel_zoom,box_zoom,reset",
-        x_range=DataRange1d(range_padding=0.15),
-        y_range=DataRange1d(range_padding=0.15),
+        x_range=Model("DataRange1d", range_padding=0.15),
+        y_range=Model("DataRange1d", range_padding=0.15),
     )
-    plot.xaxis.ticker = BasicTicker(desired_num_ticks=5)
-    plot.match_aspect = True
+    zoom = Model("BoxZoomTool", dimensions="both")
+    plot.add_tools(Model("PanTool"), Model("WheelZoomTool"), zoom, Model("ResetTool"))
+    plot.x_axis.set(ticker=Model("BasicTicker", desired_num_ticks=5))
+    plot.set(match_aspect=True)
     for colour, name, poses in ((LEADER, "leader", both[:, :3]), (FOLLOWER, "follower", both[:, 3:])):
         _draw_track(plot, t, poses, colour, name)
     rows = spread_rows(len(t), _MOMENTS)
-    ends = [both[rows, 0].tolist(), both[rows, 3].tolist()], [both[rows, 1].tolist(), both[rows, 4].tolist()]
-    plot.multi_line(
-        [list(pair) for pair in zip(*ends[0], strict=True)],
-        [list(pair) for pair in zip(*ends[1], strict=True)],
-        line_color=GREY,
-        line_dash="dotted",
-    )
+    pairs = source_of({"xs": both[rows][:, [0, 3]].tolist(), "ys": both[rows][:, [1, 4]].tolist()})
+    looks = {"line_color": Value(GREY), "line_dash": Value("dotted")}
+    plot.add_glyph(pairs, Model("MultiLine", **_OUTLINE, **looks))
     extent = float(np.max(np.ptp(np.concatenate([both[:, :2], both[:, 3:5]]), axis=0)))
     size = _MARK_SHARE * max(extent, 1.0)
     _draw_marks(plot, t[rows], both[rows, :3], LEADER, size)
@@ -61,19 +57,20 @@ def track_panel(data: PlotData) -> Panel | None:
     return Panel("From above", says, (Key("leader", LEADER), Key("follower", FOLLOWER)), plot, tall=True)
 
 
-def _draw_track(plot: figure, t: FloatArray, poses: FloatArray, colour: str, name: str) -> None:
+def _draw_track(plot: Figure, t: FloatArray, poses: FloatArray, colour: str, name: str) -> None:
     rows = spread_rows(len(t), MOST_POINTS)
     moments, x = with_gaps(t[rows], poses[rows, 0])
     _, y = with_gaps(t[rows], poses[rows, 1])
     _, heading = with_gaps(t[rows], np.degrees(poses[rows, 2]))
     columns = {"t": moments, "x": x, "y": y, "heading": heading}
-    source = ColumnDataSource({key: values.astype(np.float32) for key, values in columns.items()})
-    line = plot.line("x", "y", source=source, line_color=colour, line_width=1.8)
+    source = source_of({key: values.astype(np.float32) for key, values in columns.items()})
+    glyph = Model("Line", x=Field("x"), y=Field("y"), line_color=colour, line_width=1.8)
+    line = plot.add_glyph(source, glyph)
     tips = {name: "@t{0.00} s", "x": "@x{0.000} m", "y": "@y{0.000} m", "heading": "@heading{0.0}°"}
     hover(plot, line, tips, mode="mouse")
 
 
-def _draw_marks(plot: figure, t: FloatArray, poses: FloatArray, colour: str, size: float) -> None:
+def _draw_marks(plot: Figure, t: FloatArray, poses: FloatArray, colour: str, size: float) -> None:
     """Arrowheads, the later the darker, with the moment behind each."""
     xs, ys = [], []
     for x, y, theta in poses.tolist():
@@ -82,13 +79,12 @@ def _draw_marks(plot: figure, t: FloatArray, poses: FloatArray, colour: str, siz
         xs.append(outline[:, 0].tolist())
         ys.append(outline[:, 1].tolist())
     opacities = np.linspace(0.45, 1.0, len(xs)).tolist()
-    plot.patches(xs, ys, fill_color=colour, fill_alpha=opacities, line_color="white", line_width=0.7)
-    plot.text(
-        poses[:, 0].tolist(),
-        poses[:, 1].tolist(),
-        text=[f"{moment:.3g} s" for moment in t.tolist()],
-        text_font_size="11px",
-        text_color=GREY,
-        x_offset=9,
-        y_offset=-7,
-    )
+    outlines = source_of({"xs": xs, "ys": ys, "opacity": opacities})
+    looks = {"fill_color": Value(colour), "fill_alpha": Field("opacity")}
+    edge = {"line_color": Value("white"), "line_width": Value(0.7)}
+    plot.add_glyph(outlines, Model("Patches", **_OUTLINE, **looks, **edge))
+    texts = [f"{moment:.3g} s" for moment in t.tolist()]
+    moments = source_of({"x": poses[:, 0], "y": poses[:, 1], "text": texts})
+    font = {"text_font_size": Value("11px"), "text_color": Value(GREY)}
+    offset = {"x_offset": Value(9), "y_offset": Value(-7)}
+    plot.add_glyph(moments, Model("Text", x=Field("x"), y=Field("y"), text=Field("text"), **font, **offset))

@@ -18,6 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from formation.kernel import entry, interpreted, kernel
+from formation.lending import lent
 from formation.records import (
     Buffer,
     Rows,
@@ -25,7 +26,6 @@ from formation.records import (
     columns_of,
     copy_of,
     dtype_of,
-    lent,
     load,
     read_byte,
     read_float,
@@ -170,6 +170,7 @@ def weighed(x: float) -> float:
     return WEIGHT * x
 """
 TOP = """from __future__ import annotations
+import sys
 from formation.compiler import DISPATCHERS
 from formation.kernel import entry
 from formation.leaf_of_a_test import weighed
@@ -210,7 +211,17 @@ def test_an_edit_in_an_imported_kernel_recompiles_and_nothing_else_does(tmp_path
     assert run(LEAF.format(weight="5.0")) == "10.0 0"
 
 
-RECORD = """from typing import NamedTuple, cast
+LOADING_TOP = TOP + 'print("scipy.linalg" in sys.modules)\n'
+
+
+def test_only_compiling_loads_the_whole_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    run = house_of_a_test(tmp_path, LOADING_TOP)
+    assert run(LEAF.format(weight="3.0")).split() == ["6.0", "0", "True"]
+    assert run(LEAF.format(weight="3.0")).split() == ["6.0", "1", "False"]
+
+
+RECORD = """from typing import NamedTuple
 from formation.kernel import kernel
 class {name}(NamedTuple):
     x: float

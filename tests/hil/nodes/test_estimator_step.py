@@ -20,8 +20,9 @@ from estimation.own_motion.own_track import OwnNoise, OwnPoint
 from estimation.tracking.follower_check import Cause
 from estimation.tracking.track_point import TrackPoint, Verdict
 from estimation.tracking.tracker import TrackSettings
+from formation.lending import lent
 from formation.pose import Pose, advance
-from formation.records import Rows, columns_of, lent, load, rows_of, store
+from formation.records import Rows, columns_of, load, rows_of, store
 from formation.ring import Ring
 from hil.nodes.estimator_desk import Desk, NodeRules, Notes, SensorRules, TimedFrame
 from hil.nodes.estimator_entries import COMPILED, PLAIN
