@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from hil.commands.collector import collector_paused
 from hil.commands.seconds import DURATION
 from hil.errors import UsageError
-from hil.live.daemon import Ending, NodeWorker, Worker, run_daemon
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario
 from hil.scenario.links import HOSTING, Link, link_of, links_of
 from hil.scenario.schema import Scenario
-from hil.wire.messages import prepare
-from hil.wire.session import Endpoints
-from hil.wire.topics import types_of, urgent_topics
+
+if TYPE_CHECKING:
+    from hil.live.daemon import Worker
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
@@ -53,6 +53,13 @@ def daemon_command(name: str, summary: str) -> click.Command:
         tethered: bool = False,
         certify: bool = False,
     ) -> None:
+        # Wire and messages take a third of a second to load, which help needs not.
+        with collector_paused():
+            from hil.live.daemon import Ending, run_daemon
+            from hil.wire.messages import prepare
+            from hil.wire.session import Endpoints
+            from hil.wire.topics import types_of, urgent_topics
+
         ending = Ending()
         ending.on_signals()
         if tethered:
@@ -109,17 +116,20 @@ def daemon_command(name: str, summary: str) -> click.Command:
 
 def _emulator(order: Order) -> Worker:
     from hil.emulator.node import EmulatorNode
+    from hil.live.daemon import NodeWorker
 
     return NodeWorker([EmulatorNode(order.scenario, order.needs)])
 
 
 def _estimator(order: Order) -> Worker:
+    from hil.live.daemon import NodeWorker
     from hil.nodes.link_nodes import estimator_node
 
     return NodeWorker([estimator_node(link) for link in order.links])
 
 
 def _controller(order: Order) -> Worker:
+    from hil.live.daemon import NodeWorker
     from hil.nodes.link_nodes import controller_node
 
     return NodeWorker([controller_node(link) for link in order.links], parting="the controller ended")
