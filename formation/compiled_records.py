@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import functools
 import inspect
-from typing import Any, get_type_hints
+from typing import Any, NamedTuple, get_type_hints
 
 from llvmlite import ir
 from numba import types
 from numba.core.typing import signature as typing_signature
 from numba.core.typing.templates import AttributeTemplate, Signature, bound_function
-from numba.extending import infer_getattr, intrinsic, lower_builtin, overload
+from numba.extending import infer_getattr, lower_builtin, type_callable
 
 from formation import records
 
@@ -43,83 +43,114 @@ def teach_records() -> None:
 # Rows: load and store
 
 
-def _walk(context: Any, builder: Any, kind: Any, dtype: Any, base: Any, value: Any) -> Any:
-    """Load a nested named tuple from an address (``value`` None), or store it there."""
+def _walk(context: Any, builder: Any, kind: Any, place: _Place, value: Any) -> Any:
+    """Load a nested named tuple from its place (``value`` None), or store it there."""
     parts = []
     for position, name in enumerate(kind.fields):
-        part = kind.types[position]
-        part_dtype, offset = dtype.fields[name][:2]
+        part, here = kind.types[position], place.field(name)
         given = None if value is None else builder.extract_value(value, position)
         if isinstance(part, types.BaseNamedTuple):
-            place = builder.add(base, ir.Constant(_WORD, offset))
-            parts.append(_walk(context, builder, part, part_dtype, place, given))
+            parts.append(_walk(context, builder, part, here, given))
             continue
         is_flag = part == types.boolean
         held = _BYTE if is_flag else context.get_value_type(part)
-        pointer = builder.inttoptr(builder.add(base, ir.Constant(_WORD, offset)), held.as_pointer())
+        pointer = here.pointer(builder, held)
         if given is not None:
-            builder.store(builder.zext(given, _BYTE) if is_flag else given, pointer)
+            done = builder.store(builder.zext(given, _BYTE) if is_flag else given, pointer)
         else:
-            got = builder.load(pointer)
-            parts.append(builder.icmp_signed("!=", got, _BYTE(0)) if is_flag else got)
+            done = builder.load(pointer)
+            parts.append(builder.icmp_signed("!=", done, _BYTE(0)) if is_flag else done)
+        done.set_metadata("tbaa", here.tag(builder.module))
     return None if value is not None else context.make_tuple(builder, kind, parts)
 
 
-def _address(context: Any, builder: Any, rows_type: Any, rows: Any, index: Any, itemsize: int) -> Any:
+class _Place(NamedTuple):
+    """A row in memory, or a field of it: where the row begins, then the field's name, type and offset."""
+
+    row: Any
+    path: str
+    dtype: Any
+    offset: int
+
+    def field(self, name: str) -> _Place:
+        dtype, offset = self.dtype.fields[name][:2]
+        return _Place(self.row, f"{self.path}.{name}", dtype, self.offset + offset)
+
+    def pointer(self, builder: Any, held: Any) -> Any:
+        at = builder.gep(self.row, [ir.Constant(_WORD, self.offset)], inbounds=True)
+        return builder.bitcast(at, held.as_pointer())
+
+    def tag(self, module: Any) -> Any:
+        """What tells LLVM that no other field of any record lies here: rows never share memory."""
+        root = module.add_metadata(["rows"])
+        scalar = module.add_metadata([self.path, root, ir.Constant(_WORD, 0)])
+        return module.add_metadata([scalar, scalar, ir.Constant(_WORD, 0)])
+
+
+def _row(context: Any, builder: Any, record: Any, rows_type: Any, rows: Any, index: Any) -> _Place:
+    dtype, kind = records.dtype_of(record.instance_class), record.instance_class
     if isinstance(rows_type, types.Array):
         array = context.make_array(rows_type)(context, builder, rows)
-        base = builder.ptrtoint(array.data, _WORD)
+        base = builder.bitcast(array.data, _BYTE.as_pointer())
     else:
-        base = builder.extract_value(rows, 0)
-    return builder.add(base, builder.mul(index, ir.Constant(_WORD, itemsize)))
+        base = builder.inttoptr(builder.extract_value(rows, 0), _BYTE.as_pointer())
+    row = builder.gep(base, [builder.mul(index, ir.Constant(_WORD, dtype.itemsize))], inbounds=True)
+    return _Place(row, f"{kind.__module__}.{kind.__qualname__}", dtype, 0)
 
 
-@intrinsic
-def _load(typing_context: Any, kind: Any, rows: Any, k: Any) -> Any:
-    record, dtype = record_type(kind.instance_class), records.dtype_of(kind.instance_class)
+def _teach(function: Any, typer: Any, code: Any) -> None:
+    """Have compiled code type calls of a function by its arguments, and put its code where they are.
 
-    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        base = _address(context, builder, rows, arguments[1], arguments[2], dtype.itemsize)
-        return _walk(context, builder, record, dtype, base, None)
-
-    return record(kind, rows, types.int64), code
-
-
-@intrinsic
-def _store(typing_context: Any, rows: Any, k: Any, value: Any) -> Any:
-    record, dtype = record_type(value.instance_class), records.dtype_of(value.instance_class)
-
-    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        base = _address(context, builder, rows, arguments[0], arguments[1], dtype.itemsize)
-        _walk(context, builder, record, dtype, base, arguments[2])
-        return context.get_dummy_value()
-
-    return types.none(rows, types.int64, record), code
+    An overload would be a function of its own for each of its types, and typed anew wherever it is called.
+    """
+    type_callable(function)(lambda context: typer)
+    lower_builtin(function, types.VarArg(types.Any))(code)
 
 
 def _teach_rows() -> None:
-    span = records.Span
+    span = record_type(records.Span)
 
-    def borrow(rows):
-        return lambda rows: span(rows.ctypes.data, len(rows))
+    def typed_load(kind: Any, rows: Any, k: Any) -> Any:
+        return typing_signature(record_type(kind.instance_class), kind, rows, types.int64)
 
-    def count(rows):
+    def load(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        record, (_, rows, _) = signature.return_type, signature.args
+        place = _row(context, builder, record, rows, *arguments[1:])
+        return _walk(context, builder, record, place, None)
+
+    def typed_store(rows: Any, k: Any, record: Any) -> Any:
+        return typing_signature(types.none, rows, types.int64, record_type(record.instance_class))
+
+    def store(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        rows, _, record = signature.args
+        place = _row(context, builder, record, rows, *arguments[:2])
+        _walk(context, builder, record, place, arguments[2])
+        return context.get_dummy_value()
+
+    def borrowed(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array = context.make_array(signature.args[0])(context, builder, arguments[0])
+        return context.make_tuple(builder, span, [builder.ptrtoint(array.data, _WORD), array.nitems])
+
+    def part(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        size = ir.Constant(_WORD, records.dtype_of(signature.args[0].instance_class).itemsize)
+        begin = builder.add(builder.extract_value(arguments[1], 0), builder.mul(arguments[2], size))
+        return context.make_tuple(builder, span, [begin, arguments[3]])
+
+    def size(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        (rows,) = signature.args
         if isinstance(rows, types.Array):
-            return lambda rows: len(rows)
-        return lambda rows: rows.length
+            return context.make_array(rows)(context, builder, arguments[0]).nitems
+        return builder.extract_value(arguments[0], 1)
 
-    overload(records.load, inline="always")(lambda kind, rows, k: lambda kind, rows, k: _load(kind, rows, k))
-    overload(records.store, inline="always")(
-        lambda rows, k, record: lambda rows, k, record: _store(rows, k, record)
+    _teach(records.load, typed_load, load)
+    _teach(records.store, typed_store, store)
+    _teach(records.borrowed, lambda rows: typing_signature(span, rows), borrowed)
+    _teach(
+        records.part,
+        lambda kind, rows, first, count: typing_signature(span, kind, rows, types.int64, types.int64),
+        part,
     )
-
-    def cut(kind, rows, first, count):
-        itemsize = records.dtype_of(kind.instance_class).itemsize
-        return lambda kind, rows, first, count: span(rows.address + first * itemsize, count)
-
-    overload(records.borrowed, inline="always")(borrow)
-    overload(records.part, inline="always")(cut)
-    overload(records.size, inline="always")(count)
+    _teach(records.size, lambda rows: typing_signature(types.int64, rows), size)
 
 
 # Bytes
@@ -131,62 +162,40 @@ def _bytes_base(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return builder.ptrtoint(context.make_array(kind)(context, builder, value).data, _WORD)
 
 
-def _reader(width: int, result: Any, signed: bool) -> Any:
-    @intrinsic
-    def read(typing_context: Any, payload: Any, at: Any) -> Any:
-        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            place = builder.add(_bytes_base(context, builder, payload, arguments[0]), arguments[1])
-            held = ir.DoubleType() if result == types.float64 else ir.IntType(width)
-            got = builder.load(builder.inttoptr(place, held.as_pointer()), align=1)
-            if result == types.float64:
-                return got
-            return builder.sext(got, _WORD) if signed else builder.zext(got, _WORD)
+def _teach_read(function: Any, width: int, result: Any, signed: bool) -> None:
+    def read(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = builder.add(_bytes_base(context, builder, signature.args[0], arguments[0]), arguments[1])
+        held = ir.DoubleType() if result == types.float64 else ir.IntType(width)
+        got = builder.load(builder.inttoptr(place, held.as_pointer()), align=1)
+        if result == types.float64:
+            return got
+        return builder.sext(got, _WORD) if signed else builder.zext(got, _WORD)
 
-        return result(payload, types.int64), code
-
-    return read
+    _teach(function, lambda payload, at: typing_signature(result, payload, types.int64), read)
 
 
-def _writer(width: int, kind: Any) -> Any:
-    @intrinsic
-    def write(typing_context: Any, buffer: Any, at: Any, value: Any) -> Any:
-        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            place = builder.add(_bytes_base(context, builder, buffer, arguments[0]), arguments[1])
-            held = ir.DoubleType() if kind == types.float64 else ir.IntType(width)
-            given = (
-                arguments[2] if kind == types.float64 or width == 64 else builder.trunc(arguments[2], held)
-            )
-            builder.store(given, builder.inttoptr(place, held.as_pointer()), align=1)
-            return context.get_dummy_value()
+def _teach_write(function: Any, width: int, kind: Any) -> None:
+    def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = builder.add(_bytes_base(context, builder, signature.args[0], arguments[0]), arguments[1])
+        held = ir.DoubleType() if kind == types.float64 else ir.IntType(width)
+        given = arguments[2]
+        if kind != types.float64 and width < 64:
+            given = builder.trunc(given, held)
+        builder.store(given, builder.inttoptr(place, held.as_pointer()), align=1)
+        return context.get_dummy_value()
 
-        return types.none(buffer, types.int64, kind), code
-
-    return write
+    _teach(function, lambda buffer, at, value: typing_signature(types.none, buffer, types.int64, kind), write)
 
 
 def _teach_bytes() -> None:
-    for function, read in (
-        (records.read_float, _reader(64, types.float64, signed=True)),
-        (records.read_int32, _reader(32, types.int64, signed=True)),
-        (records.read_uint32, _reader(32, types.int64, signed=False)),
-        (records.read_byte, _reader(8, types.int64, signed=False)),
-    ):
-        overload(function, inline="always")(_calling_read(read))
-    for put, write in (
-        (records.write_float, _writer(64, types.float64)),
-        (records.write_int32, _writer(32, types.int64)),
-        (records.write_int64, _writer(64, types.int64)),
-        (records.write_byte, _writer(8, types.int64)),
-    ):
-        overload(put, inline="always")(_calling_write(write))
-
-
-def _calling_read(read: Any) -> Any:
-    return lambda payload, at: lambda payload, at: read(payload, at)
-
-
-def _calling_write(write: Any) -> Any:
-    return lambda buffer, at, value: lambda buffer, at, value: write(buffer, at, value)
+    _teach_read(records.read_float, 64, types.float64, signed=True)
+    _teach_read(records.read_int32, 32, types.int64, signed=True)
+    _teach_read(records.read_uint32, 32, types.int64, signed=False)
+    _teach_read(records.read_byte, 8, types.int64, signed=False)
+    _teach_write(records.write_float, 64, types.float64)
+    _teach_write(records.write_int32, 32, types.int64)
+    _teach_write(records.write_int64, 64, types.int64)
+    _teach_write(records.write_byte, 8, types.int64)
 
 
 # Named tuples: x._replace(field=value), and methods

@@ -104,7 +104,7 @@ def sight_of(reported: Reported) -> Sight:
     )
 
 
-@kernel(inline=False)
+@kernel
 def predicted(
     sight: Sight, commands: Rows[SentCommand], sent: Ring, until_ns: int, lag: float, further: float
 ) -> Line:

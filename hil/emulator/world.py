@@ -174,7 +174,7 @@ def due_ns(world: World, memory: Memory) -> int:
     return min(due, load(Underway, memory.underway, place(world.underway, memory.underway, 0)).release_ns)
 
 
-@kernel(inline=False)
+@kernel
 def moved(world: World, lab: Lab, robots: Rows[Robot], until_ns: int) -> World:
     """World at a later time; all robots drive until then."""
     if until_ns <= world.time_ns:

@@ -266,7 +266,7 @@ def _decided(flight: Flight, plan: Plan, rooms: Rooms, k: int, control: ControlS
     return flight._replace(commands=flight.commands + 1)
 
 
-@kernel(inline=False)
+@kernel
 def _obeyed(flight: Flight, plan: Plan, rooms: Rooms, first: int, now_ns: int) -> Flight:
     """Commands from the ``first`` on reach their robots, and whoever follows those."""
     world = flight.world

@@ -162,7 +162,7 @@ def heard_order(state: ControlState, rules: ControlRules, sign: float) -> OrderH
     return OrderHeard(state._replace(follower=follower), ordered.taken)
 
 
-@kernel(inline=False)
+@kernel
 def commanded(
     state: ControlState, rules: ControlRules, commands: Rows[SentCommand], now_ns: int
 ) -> Controlled:
