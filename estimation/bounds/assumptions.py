@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from estimation.bounds.guarantees import leader_acceleration
-from estimation.bounds.window_estimator import window_estimator
+from estimation.bounds.window_difference import best_difference
 from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
 from formation.station import Side
@@ -42,5 +42,5 @@ class Assumptions:
 
     @property
     def velocity_error(self) -> float:
-        """Guaranteed error W of the leader's velocity [m/s], by the best window estimator."""
-        return window_estimator(self.eps, self.acceleration, self.step).bound
+        """Guaranteed error W of the leader's velocity [m/s], by the best difference over a window."""
+        return best_difference(self.eps, self.acceleration, self.step).error

@@ -2,8 +2,9 @@
 
 Every claim says what it rests on, and where nothing can be claimed, why. The chain: a bound eps of the noise
 and a bound A of the leader's acceleration give the error W of its velocity, in any direction, that the best
-window estimator guarantees; W gives the bounds on rates, on v1 and alpha1, and on h; the rate of alpha2 its
-ultimate bound; the leader's turn rate the invariant set of (rho, alpha1), without and with the errors of h.
+difference over a window guarantees; W gives the bounds on rates, on v1 and alpha1, and on h; the rate of
+alpha2 its ultimate bound; the leader's turn rate the invariant set of (rho, alpha1), without and with the
+errors of h.
 """
 
 from __future__ import annotations
@@ -86,7 +87,7 @@ def _sources(given: Assumptions) -> tuple[str, ...]:
         f"v1 <= k_v = {given.k_v:g} m/s at constant speed and |u1| <= k_u = {given.k_u:g} rad/s, "
         f"so that the leader accelerates by at most {given.acceleration:.3g} m/s^2",
         f"a measurement every {1e3 * given.step:.3g} ms over the window, none missing",
-        "the estimator of the window's linear program; a Kalman filter does better, unguaranteed",
+        "a plain difference over the best window; a Kalman filter does better, unguaranteed",
     )
 
 
