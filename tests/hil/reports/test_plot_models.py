@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ Read = Callable[[str], list[Any]]
 
 
 @pytest.fixture
-def read(caplog: pytest.LogCaptureFixture) -> Read:
+def read(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> Iterator[Read]:
     """Roots of a document as Bokeh reads them; it raises for wrong values, and tells of unknown names."""
 
     def roots(document: str) -> list[Any]:
@@ -34,7 +35,13 @@ def read(caplog: pytest.LogCaptureFixture) -> Read:
         assert caplog.messages == []
         return found
 
-    return roots
+    # Whatever others have made of its logger in this process.
+    teller = logging.getLogger("bokeh.core.has_props")
+    monkeypatch.setattr(teller, "disabled", False)
+    teller.addHandler(caplog.handler)
+    with caplog.at_level(logging.WARNING, teller.name):
+        yield roots
+    teller.removeHandler(caplog.handler)
 
 
 def document_in(page: str) -> str:
