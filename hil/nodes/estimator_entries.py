@@ -1,6 +1,6 @@
 """The estimator's step, compiled: what Python enters once or twice for every message that comes in.
 
-An input is first read and checked, ``see_*``, and then taken into the tracks, ``take_*``; in between Python
+An input is first read and checked, ``see_*``, and then taken into the tracks, ``take``; in between Python
 may look at it. Both work on the node's :class:`hil.nodes.estimator_desk.Desk`, in a row (1,).
 """
 
@@ -23,7 +23,7 @@ from formation.records import Rows, load, store
 from hil.nodes import estimator_step as step
 from hil.nodes.counting import count
 from hil.nodes.estimator_desk import Desk, NodeRules, Notes, TimedFrame, forget, forget_tracks, noted
-from hil.nodes.estimator_step import Known, Taken
+from hil.nodes.estimator_step import Known, Rules, Taken
 from hil.nodes.frame_time import time_of
 from hil.nodes.refusals import (
     BAD_RANGE,
@@ -47,6 +47,9 @@ from hil.wire.records import Frame, FrameHead, Sighting, Wanted
 SEEN, RESTARTED, SET_BACK = 1, 2, 4
 """What comes of an input that is seen, added up: it can be used, the clock of the frames has jumped, this
 host's clock was set back. Either of the last two makes what was known before worthless."""
+
+FRAME, SIGHTING, ODOMETRY = range(3)
+"""What can be taken."""
 
 TICK_NS = 50_000_000
 """How often a node looks whether there is still something to estimate from."""
@@ -171,37 +174,41 @@ def see_sighting(desks: Rows[Desk], payload: bytes, digest: int, now_ns: int) ->
     return came + SEEN
 
 
-@entry
-def take_frame(desks: Rows[Desk], reasons: bytes, now_ns: int) -> int:
-    """Take the frame that was seen into the tracks; the length of the estimate's message, 0 for none."""
-    desk = load(Desk, desks, 0)
-    known, rules = load(Known, desk.known, 0), load(NodeRules, desk.rules, 0).step
+@kernel
+def _take_frame(desk: Desk, known: Known, rules: Rules) -> Taken:
+    """Take the frame that was seen into the tracks."""
     frame = load(TimedFrame, desk.frame, 0)
-    taken = step.take_frame(known, desk.memory(), rules, frame.capture_ns, frame.seen)
-    return _moved_on(desk, taken, reasons, now_ns)
+    return step.take_frame(known, desk.memory(), rules, frame.capture_ns, frame.seen)
 
 
-@entry
-def take_sighting(desks: Rows[Desk], reasons: bytes, now_ns: int) -> int:
-    """The same with the sighting that was seen."""
-    desk = load(Desk, desks, 0)
-    known, memory, seen = load(Known, desk.known, 0), desk.memory(), load(Sighting, desk.sighting, 0)
-    rules = load(NodeRules, desk.rules, 0)
-    sensor = rules.sensor
-    motion = step.by_odometry(known, memory, rules.step, seen.capture_ns)
+@kernel
+def _take_sighting(desk: Desk, known: Known, rules: Rules) -> Taken:
+    """Take the sighting that was seen into the leader's track."""
+    memory, sensor = desk.memory(), load(NodeRules, desk.rules, 0).sensor
+    seen = load(Sighting, desk.sighting, 0)
+    motion = step.by_odometry(known, memory, rules, seen.capture_ns)
     measurement = measure_body(
         seen.capture_ns, seen.rho, seen.alpha2, sensor.sigma_range, sensor.sigma_bearing, motion
     )
-    return _moved_on(desk, step.take(known, memory, rules.step, measurement), reasons, now_ns)
+    return step.take(known, memory, rules, measurement)
 
 
 @entry
-def take_odometry(desks: Rows[Desk]) -> None:
-    """Take the odometry that was seen in, and fold again what came after the sample before it."""
+def take(desks: Rows[Desk], what: int, reasons: bytes, now_ns: int) -> int:
+    """Take what was seen into the tracks; the length of the estimate's message, 0 for none.
+
+    ``what``: FRAME, SIGHTING, or ODOMETRY, which folds again what came after the sample before it. One entry
+    for all three, so that the filter is compiled into it once.
+    """
     desk = load(Desk, desks, 0)
-    known, sample = load(Known, desk.known, 0), load(MotionSample, desk.sample, 0)
-    rules = load(NodeRules, desk.rules, 0).step
-    store(desk.known, 0, step.take_odometry(known, desk.memory(), rules, sample))
+    known, rules = load(Known, desk.known, 0), load(NodeRules, desk.rules, 0).step
+    if what == ODOMETRY:
+        sample = load(MotionSample, desk.sample, 0)
+        store(desk.known, 0, step.take_odometry(known, desk.memory(), rules, sample))
+        return 0
+    if what == FRAME:
+        return _moved_on(desk, _take_frame(desk, known, rules), reasons, now_ns)
+    return _moved_on(desk, _take_sighting(desk, known, rules), reasons, now_ns)
 
 
 @entry
@@ -232,9 +239,7 @@ class Steps(NamedTuple):
     see_frame: Callable[[Rows[Desk], bytes, bytes, bool, int, int], int]
     see_odometry: Callable[[Rows[Desk], bytes, int, int], int]
     see_sighting: Callable[[Rows[Desk], bytes, int, int], int]
-    take_frame: Callable[[Rows[Desk], bytes, int], int]
-    take_odometry: Callable[[Rows[Desk]], None]
-    take_sighting: Callable[[Rows[Desk], bytes, int], int]
+    take: Callable[[Rows[Desk], int, bytes, int], int]
     tick: Callable[[Rows[Desk], bytes, int], int]
     status: Callable[[Rows[Desk], int], int]
 
@@ -243,9 +248,7 @@ COMPILED = Steps(
     see_frame,
     see_odometry,
     see_sighting,
-    take_frame,
-    take_odometry,
-    take_sighting,
+    take,
     tick,
     status,
 )
