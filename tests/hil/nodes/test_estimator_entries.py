@@ -7,6 +7,7 @@ import math
 import pytest
 
 from controllers.guard import CLOCK_TOLERANCE_NS
+from estimation.own_motion.odometry_history import MotionSample
 from estimation.tracking.tracker import Status
 from formation.pose import Motion, Pose
 from hil.emulator.lab_messages import frame_message, odometry_message
@@ -49,6 +50,18 @@ def test_odometry_and_sightings_may_be_as_early_as_clocks_differ(early_ns: int, 
     assert kept.see_sighting(sighting(NOW_NS + early_ns, 0.5, 1.0), 2, NOW_NS) == (SEEN if seen else 0)
     assert kept.refused == ({} if seen else {"bad_stamp": 2})
     assert kept.taken == ({"frames": 1, "odometry": 1} if seen else {})
+
+
+def test_what_is_seen_is_what_the_message_says_by_the_hosts_clock() -> None:
+    kept = memory("estimator.stamp_offset_s=0.25")
+    assert kept.see_odometry(odometry(NOW_NS - 7), 1, NOW_NS) == SEEN
+    assert kept.sample == MotionSample(NOW_NS - 7, 0.1, 0.2)
+    kept.take_odometry()
+    assert kept.history == (kept.sample,)
+    assert kept.see_frame(frame(NOW_NS, 1), 1, NOW_NS) == SEEN
+    assert kept.frame.capture_ns == NOW_NS - 250 * MS
+    assert kept.frame.seen[:2] == (0.3, 0.0)
+    assert kept.frame.seen.follower == pytest.approx(FOLLOWER)
 
 
 @pytest.mark.parametrize("kind", ["odometry", "frame", "sighting"])
