@@ -155,3 +155,19 @@ def test_a_leader_is_gentle_whose_turn_the_correction_outweighs() -> None:
         assert gentle(0.2, u1, GAINS) is expected
         assert gentle(0.2, -u1, GAINS) is expected
     assert gentle(0.0, 0.0, GAINS)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize(
+    ("value", "aside", "taken"),
+    [(0.48, 0.0, True), (0.52, 0.0, False), (0.1, 0.48, True), (0.1, -0.48, True), (0.1, 0.52, False)],
+)
+def test_the_law_takes_over_well_inside_its_region_from_who_heads_nearly_right(
+    sign: float, value: float, aside: float, taken: bool
+) -> None:
+    station = Station(Side.of(sign))
+    shape = Shape(0.5, station.alpha1 + math.acos(1.0 - value), station.alpha2 + aside)
+    assert lyapunov(shape, GAINS.spacing, station) == pytest.approx(value)
+    begun = SideChange(sign, shape.alpha1, False)
+    found = change_step(begun, GAINS.settings(LIMITS), line_of(shape), V1, 0.0, DT)
+    assert found.change.arrived is taken
