@@ -130,3 +130,48 @@ def test_a_leader_that_hardly_turns_still_gives_a_pair_that_closes_in() -> None:
     assert "closes in" in design(replace(TASK, k_u=1e-3)).bounds["mu_rho"].why_least
     assert mu_rho * TASK.rho_0 > 0.3
     assert math.isfinite(mu1)
+
+
+@pytest.mark.parametrize(
+    "task",
+    [replace(TASK, sd_alpha1=0.14), replace(TASK, sd_rho=0.01), replace(TASK, sd_alpha1=0.08, sd_rho=0.006)],
+)
+def test_noise_in_the_speed_fills_what_the_limit_leaves_where_it_ends_the_gains(task: Task) -> None:
+    """By the errors of law (8) near the formation: of v1, of alpha1 by rho_0 mu1, of rho by v1 2 mu_rho."""
+    bounds = design(task).bounds
+    assert "noise in v2" in bounds["mu1"].why_most
+    mu1, growth = bounds["mu1"].most, bounds["mu1"].most / bounds["mu1"].least
+    mu_rho = growth**2 * bounds["mu_rho"].least
+    by_angle, by_distance = 0.2 * mu1 * task.sd_alpha1, 2.0 * 0.08 * mu_rho * task.sd_rho
+    noise = math.sqrt(task.sd_v1**2 + by_angle**2 + by_distance**2)
+    assert 3.0 * noise == pytest.approx(0.22 - 0.08, rel=1e-9)
+
+
+def test_noise_in_the_turn_rate_fills_what_the_limit_leaves_or_delay_ends_mu2_first() -> None:
+    loud = design(replace(TASK, sd_alpha2=0.1)).bounds
+    assert "noise in u2" in loud["mu2"].why_most
+    assert 3.0 * (0.1 * loud["mu2"].most + 0.02 * loud["mu1"].least) == pytest.approx(2.84 - 0.7)
+    late = design(LATE).bounds["mu2"]
+    assert "phase margin" in late.why_most
+    # A loop mu2 / s with the delay that is left keeps 45 degrees.
+    assert 0.5 * math.pi - late.most * 0.2 * 0.9 == pytest.approx(PHASE_MARGIN)
+    assert design(replace(TASK, delay=0.0, sd_alpha2=0.0)).bounds["mu2"].most == math.inf
+
+
+def test_the_phase_margin_ends_the_gains_where_the_delay_does() -> None:
+    bounds = design(replace(TASK, delay=0.8, limits=Limits(0.6, 6.0))).bounds
+    assert "phase margin" in bounds["mu1"].why_most
+    growth = bounds["mu1"].most / bounds["mu1"].least
+    mu1, mu_rho = bounds["mu1"].most, growth**2 * bounds["mu_rho"].least
+    square = 2.0 * mu_rho * 0.08**2 / 0.2
+    # Where the open loop (mu1 s + w^2) / s^2 has the gain 1, at its least; both grow as the docs say.
+    roots = np.roots([1.0, 0.0, -((mu1 / growth) ** 2), 0.0, -((square / growth**2) ** 2)])
+    crossover = max(root.real for root in roots)
+    phase = cmath.phase(complex(square / growth**2, mu1 / growth * crossover))
+    assert phase - growth * crossover * 0.2 * 0.8 == pytest.approx(PHASE_MARGIN, rel=1e-6)
+
+
+def test_alpha1_half_a_radian_off_calls_for_no_more_than_the_speed_limit() -> None:
+    bound = design(replace(TASK, delay=0.0)).bounds["mu1"]
+    assert "alpha1 0.5 rad off" in bound.why_most
+    assert 0.5 * 0.2 * bound.most == pytest.approx(0.22)

@@ -13,7 +13,7 @@ from controllers.station_keeper import StationKeeper, StationState
 from formation.pose import Motion
 from formation.shape import Shape
 from formation.spacing import Spacing
-from formation.station import Side
+from formation.station import Side, Station
 
 GAINS, LIMITS = Gains(1.0, 2.0, Spacing(0.5, 2.0)), Limits(1.5, 2.84)
 AT_STATION = Shape(0.5, -0.5 * math.pi, 0.5 * math.pi)
@@ -81,3 +81,21 @@ def test_after_a_stop_at_its_station_the_law_goes_on() -> None:
     state, motion = keeper().drive(stood, AT_STATION, Motion(V1, 0.0), math.nan, 0.01)
     assert state == keeper().begin()
     assert motion == LAWS["independent"](AT_STATION, V1, math.nan, GAINS, LIMITS)
+
+
+def test_on_the_way_the_change_goes_on_from_where_it_was_and_not_from_where_the_pair_is() -> None:
+    begun, _ = keeper().drive(ordered(Side.LEFT), AT_STATION, Motion(V1, 0.0), math.nan, 0.01)
+    phase = begun.change.phase
+    aside = AT_STATION._replace(alpha1=phase - 0.2)
+    going, _ = keeper().drive(begun, aside, Motion(V1, 0.0), math.nan, 0.01)
+    assert going.change.phase == pytest.approx(phase, abs=0.01)
+
+
+@pytest.mark.parametrize("law", ["independent", "ideal"])
+def test_by_the_law_alone_it_drives_at_the_side_that_it_goes_to(law: str) -> None:
+    begun, _ = keeper(law).drive(ordered(Side.LEFT), AT_STATION, Motion(V1, 0.0), 0.0, 0.01)
+    assert (begun.ordered, begun.change.arrived) == (Side.LEFT, False)
+    shape, leader = Shape(0.6, 1.4, -1.7), Motion(V1, 0.3)
+    left = Gains(1.0, 2.0, Spacing(0.5, 2.0), Station(Side.LEFT))
+    assert keeper(law).by_law(begun, shape, leader) == LAWS[law](shape, V1, 0.3, left, LIMITS)
+    assert keeper(law).by_law(keeper(law).begin(), shape, leader) == LAWS[law](shape, V1, 0.3, GAINS, LIMITS)

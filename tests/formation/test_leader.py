@@ -85,9 +85,19 @@ def test_tables_without_sense_are_refused(t: list[float], v: list[float], messag
         Table(t, v, [0.0] * len(t))
 
 
+@pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf])
+def test_waves_and_bells_without_sense_are_refused(bad: float) -> None:
+    with pytest.raises(ValueError, match=r"^omega is"):
+        Sinusoid(0.5, 0.5, 1.0, bad)
+    with pytest.raises(ValueError, match=r"^t_width is"):
+        Impulse(0.5, 1.0, 5.0, bad)
+
+
 def test_programs_name_the_step_that_misses_nothing() -> None:
     assert Constant(0.5).longest_step == math.inf
-    assert Impulse(0.5, 1.0, 5.0, 0.2).longest_step < 0.2
+    assert Sinusoid(0.5, 0.1, 0.2, 3.0).longest_step == pytest.approx(2.0 * math.pi / 3.0 / 8.0)
+    assert Impulse(0.5, 1.0, 5.0, 0.2).longest_step == 0.1
+    assert Table([0.0], [0.0], [0.0]).longest_step == math.inf
     assert Table([0.0, 1.0, 1.25], [0.0] * 3, [0.0] * 3).longest_step == 0.25
 
 

@@ -10,6 +10,7 @@ from scipy.integrate import quad
 
 from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2, Shape
 from formation.spacing import Spacing, lyapunov
+from formation.station import Side, Station
 
 spacings = st.builds(Spacing, st.floats(0.1, 2), st.floats(0.1, 30))
 distances = st.floats(0.05, 10)
@@ -58,3 +59,19 @@ def test_lyapunov_function_vanishes_abreast_and_has_the_papers_start_outside() -
     spacing = Spacing(0.5, 2.0)
     assert lyapunov(Shape(0.5, ABREAST_ALPHA1, ABREAST_ALPHA2), spacing) == 0.0
     assert lyapunov(Shape(1.0, math.pi / 4, math.pi / 2), spacing) == pytest.approx(2.2071, abs=5e-5)
+
+
+@given(spacings, distances)
+def test_a_pull_has_its_distance(spacing: Spacing, rho: float) -> None:
+    assert spacing.distance(spacing.f(rho)) == pytest.approx(rho, rel=1e-6)
+    assert spacing.distance(0.0) == spacing.rho_0
+
+
+@given(spacings, distances, st.sampled_from(Side), st.floats(0.1, 3.0), st.floats(-3.1, 3.1))
+def test_at_any_station_it_weighs_the_angle_off_it_and_the_distance(
+    spacing: Spacing, rho: float, side: Side, bearing: float, off: float
+) -> None:
+    station = Station(side, bearing)
+    shape = Shape(rho, station.alpha1 + off, station.alpha2)
+    expected = 1.0 - math.cos(off) + math.sin(bearing) * spacing.g(rho)
+    assert lyapunov(shape, spacing, station) == pytest.approx(expected, rel=1e-9, abs=1e-9)

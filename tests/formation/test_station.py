@@ -37,3 +37,22 @@ def test_abreast_on_the_right_is_the_papers_and_exact() -> None:
 def test_in_line_ahead_there_is_no_station(bearing: float) -> None:
     with pytest.raises(ValueError, match="bearing"):
         Station(Side.RIGHT, bearing)
+
+
+@given(stations, st.floats(-10.0, 10.0))
+def test_off_the_station_by_an_angle_is_off_abreast_by_it(station: Station, alpha1: float) -> None:
+    off = station.offset(alpha1)
+    assert -math.pi < off <= math.pi
+    assert math.sin(off) == pytest.approx(math.sin(alpha1 - station.alpha1), abs=1e-12)
+    assert math.cos(off) == pytest.approx(math.cos(alpha1 - station.alpha1), abs=1e-12)
+    assert math.cos(alpha1 + station.to_abreast) == pytest.approx(math.sin(off), abs=1e-12)
+    assert (station.cos, station.sin) == pytest.approx((math.cos(station.alpha2), math.sin(station.alpha2)))
+    assert ABREAST.to_abreast == 0.0
+
+
+def test_sides_are_known_by_their_signs_and_are_each_others_other() -> None:
+    assert [(side, side.sign, side.other) for side in Side] == [
+        (Side.RIGHT, 1.0, Side.LEFT),
+        (Side.LEFT, -1.0, Side.RIGHT),
+    ]
+    assert [Side.of(side.sign) for side in Side] == list(Side)

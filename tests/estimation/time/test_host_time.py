@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from estimation.time.delay_line import Arrival
-from estimation.time.host_time import NO_TIME_YET, HostTime, TimeRows, on_host, time_rows
+from estimation.time.host_time import NO_TIME_YET, HostTime, Knot, TimeRows, on_host, time_rows
+from formation.records import load
+from formation.ring import place
 
 MS = 1_000_000
 LATENCY_NS = 30 * MS
@@ -68,3 +70,62 @@ def test_a_jump_leaves_a_gap_and_no_step() -> None:
     assert times.clock.jumps == 1
     assert max(abs(found_ns - true_ns) for true_ns, found_ns in found) < 2 * MS
     assert max(b - a for (a, _), (b, _) in pairwise(found)) < 320 * MS
+
+
+def knots(times: HostTime, rows: TimeRows) -> list[Knot]:
+    """Captures that are mapped, oldest first."""
+    ring = times.knots
+    return [load(Knot, rows.knots, place(ring, rows.knots, k)) for k in range(ring.length)]
+
+
+def shown(k: int, capture_ns: int, delay_ns: int = 0) -> Arrival:
+    """Frame of a clock that goes as the host's does, from another begin."""
+    return Arrival(k, capture_ns, HOST_NS + capture_ns + LATENCY_NS + delay_ns)
+
+
+def steady(captures: list[int]) -> tuple[HostTime, TimeRows]:
+    times, rows = NO_TIME_YET, time_rows()
+    for k, capture_ns in enumerate(captures):
+        times, _ = told(times, rows, shown(k, capture_ns))
+    return times, rows
+
+
+def test_captures_are_kept_for_exactly_a_second() -> None:
+    captures = [k * 50 * MS for k in range(60)]
+    times, rows = steady(captures)
+    assert knots(times, rows) == [Knot(each, HOST_NS + each) for each in captures[-21:]]
+    # A nanosecond later the oldest is too old.
+    times, found_ns = told(times, rows, shown(60, captures[-1] + 1))
+    assert found_ns == HOST_NS + captures[-1] + 1
+    assert [knot.capture_ns for knot in knots(times, rows)] == [*captures[-20:], captures[-1] + 1]
+
+
+def test_of_more_captures_than_there_is_room_for_the_newest_are_kept() -> None:
+    captures = [*(k * 50 * MS for k in range(6)), *(300 * MS + k * 1000 for k in range(2100))]
+    times, rows = steady(captures)
+    assert [knot.capture_ns for knot in knots(times, rows)] == captures[-2048:]
+
+
+def test_what_comes_late_is_put_linearly_between_its_neighbours() -> None:
+    times, rows = steady([k * 50 * MS for k in range(10)])
+    # The line sinks by what comes 8 ms sooner than any before, and with it the newest capture.
+    times, found_ns = told(times, rows, shown(10, 540 * MS, -8 * MS))
+    assert found_ns == HOST_NS + 532 * MS
+    before, after = knots(times, rows)[-2:]
+    assert (before.capture_ns, after.capture_ns) == (450 * MS, 540 * MS)
+    for late_ns, host_ns in ((450 * MS + 1, 450 * MS + 1), (480 * MS, 450 * MS + 82 * MS // 3)):
+        assert told(times, rows, shown(9, late_ns, 60 * MS))[1] == pytest.approx(HOST_NS + host_ns, abs=1)
+    assert knots(times, rows)[-2:] == [before, after]
+
+
+def test_what_was_captured_before_all_that_is_kept_is_as_far_ahead_of_the_oldest() -> None:
+    times, rows = steady([k * 50 * MS for k in range(60)])
+    first = knots(times, rows)[0]
+    _, found_ns = told(times, rows, shown(60, first.capture_ns - 7 * MS, 45 * MS))
+    assert found_ns == first.host_ns - 7 * MS
+
+
+def test_host_times_increase_though_the_line_sinks_by_more_than_a_frame() -> None:
+    times, rows = steady([k * 50 * MS for k in range(10)])
+    times, found_ns = told(times, rows, shown(10, 455 * MS, -20 * MS))
+    assert found_ns == HOST_NS + 450 * MS + 1

@@ -7,12 +7,20 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from estimation.filters.belief import Model
+from estimation.filters.filter import Kind, filter_of
 from estimation.filters.gaussian import Gaussian
-from estimation.models.coordinated_turn import FollowerMotion
-from estimation.models.measurement import Measurement, PoseNoise, measure_body_from_mocap, measure_world
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
+from estimation.models.measurement import (
+    FrontEnd,
+    Measurement,
+    PoseNoise,
+    measure_body_from_mocap,
+    measure_world,
+)
 from estimation.models.motion import Matrix, Vector
-from estimation.tracking.estimate import QUANTITIES, Estimate, estimate_of
-from estimation.tracking.track_point import NO_JUMP
+from estimation.tracking.estimate import QUANTITIES, Estimate, estimate_at, estimate_of
+from estimation.tracking.track_point import NO_JUMP, JumpUncertainty, begun
 from estimation.tracking.tracker import Status
 from formation.angles import wrap
 from formation.pose import Motion, Pose
@@ -153,3 +161,38 @@ def test_a_leader_on_the_spot_or_at_rest_gives_numbers(mean: list[float]) -> Non
     values = [getattr(found, name) for name in (*QUANTITIES, "rho", "alpha2")]
     assert all(map(math.isfinite, values))
     assert np.isfinite(found.covariance).all()
+
+
+@given(poses, leader_motions, poses, follower_motions)
+@settings(deadline=None, max_examples=30)
+def test_a_jump_is_uncertain_as_so_much_noise_of_the_followers_pose_would_be(
+    leader: Pose, driven: Motion, follower: Pose, own: Motion
+) -> None:
+    assume(math.dist((leader.x, leader.y), (follower.x, follower.y)) > 0.05)
+    belief, moment = world_belief(leader, driven), mocap_moment(leader, follower, own, (0.01, 0.02))
+    jump = JumpUncertainty(0.03, 0.2, 7_000)
+    found = estimate_of(belief, moment, Status.TRACKING, 1.5, 4_000, jump)
+    noise = PoseNoise(math.hypot(NOISE.position, 0.03), math.hypot(NOISE.heading, 0.2))
+    expected = estimated(belief, moment._replace(noise=noise))
+    assert found.covariance == pytest.approx(expected.covariance, rel=1e-9, abs=1e-12)
+    assert found.jump == jump
+    assert found._replace(joint=expected.joint, jump=NO_JUMP) == expected
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_point_is_seen_from_the_pose_that_is_believed(known: bool) -> None:
+    leader, follower, believed = Pose(0.5, 0.2, 0.8), Pose(-0.1, 0.3, -0.4), Pose(-0.2, 0.25, -0.5)
+    limits = LeaderLimits(v_eps=0.04, k_v=0.1, k_u=0.7)
+    estimator = filter_of(Kind.EKF, Model(FrontEnd.WORLD, limits, ProcessNoise.by_rule(limits, 0.5)))
+    moment = mocap_moment(leader, follower, Motion(0.1, 0.4), (0.01, 0.02))
+    point = begun(moment, estimator)
+    point = point._replace(
+        belief=world_belief(leader, Motion(0.2, 0.3)),
+        nis=2.5,
+        used_ns=3_000,
+        jump=JumpUncertainty(0.01, 0.1, 2_000),
+        check=point.check._replace(known=known, pose=believed),
+    )
+    seen = moment._replace(seen=moment.seen._replace(follower=believed)) if known else moment
+    expected = estimate_of(point.belief, seen, Status.COASTING, 2.5, 3_000, point.jump)
+    assert estimate_at(point, Status.COASTING) == expected

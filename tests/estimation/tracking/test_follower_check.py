@@ -14,6 +14,9 @@ from estimation.tracking.follower_check import (
     carried,
     check_from,
     checked,
+    heading_misfit,
+    misfit,
+    position_misfit,
 )
 from formation.pose import Pose, advance
 
@@ -123,3 +126,70 @@ def test_the_causes_are_counted_by_words() -> None:
     assert [cause.word for cause in Cause] == [
         "", "gated", "follower_outlier", "flipped_heading", "swapped", "frozen"
     ]  # fmt: skip
+
+
+def test_what_carries_a_pose_makes_it_uncertain_by_noise_slip_and_change() -> None:
+    """By hand, at a mean of 0.2 m/s and -1 rad/s that change by 0.1 m/s and 0.4 rad/s, over half a second."""
+    check = check_at(HERE)._replace(sd_position=0.001, sd_heading=0.01)
+    before, after = FollowerMotion(0.15, -0.8, 0.005, 0.03), FollowerMotion(0.25, -1.2, 0.004, 0.02)
+    sd_heading = 0.01 + 0.5 * (0.03 + 0.1 + 0.2)
+    for first, second in ((before, after), (after, before)):
+        found = carried(check, first, second, 0.5)
+        assert found.pose == pytest.approx(advance(HERE, 0.2, -1.0, 0.5), abs=1e-15)
+        assert found.sd_heading == pytest.approx(sd_heading)
+        assert found.sd_position == pytest.approx(0.001 + 0.5 * (0.005 + 0.02 + 0.05 + 0.2 * sd_heading))
+    # Driving back and turning the other way is as uncertain as driving on.
+    first, second = (each._replace(v2=-each.v2, u2=-each.u2) for each in (before, after))
+    assert carried(check, first, second, 0.5)[2:4] == pytest.approx(carried(check, before, after, 0.5)[2:4])
+
+
+def test_a_misfit_is_the_square_of_standard_deviations_the_larger_of_place_and_heading() -> None:
+    check = check_at(HERE)._replace(sd_position=0.003, sd_heading=0.04)
+    noise = PoseNoise(0.001, 0.01)
+    place, heading = 2.0 * 0.001**2 + 0.003**2, 2.0 * 0.01**2 + 0.04**2
+    aside = Pose(HERE.x + 0.006, HERE.y - 0.008, HERE.theta + 0.03)
+    assert position_misfit(check, aside.x, aside.y, noise) == pytest.approx(1e-4 / place)
+    assert heading_misfit(check, aside.theta, noise) == pytest.approx(9e-4 / heading)
+    assert misfit(check, aside, noise) == pytest.approx(1e-4 / place)
+    turned = Pose(HERE.x + 1e-4, HERE.y, HERE.theta - 2.0 * math.pi + 0.5)
+    assert misfit(check, turned, noise) == pytest.approx(0.25 / heading)
+
+
+def test_where_there_is_no_noise_only_the_very_pose_fits() -> None:
+    exact = PoseNoise(0.0, 0.0)
+    assert misfit(check_at(HERE), HERE, exact) == 0.0
+    for other in (HERE._replace(y=HERE.y + 1e-9), HERE._replace(theta=HERE.theta - 1e-9)):
+        assert misfit(check_at(HERE), other, exact) == math.inf
+
+
+@pytest.mark.parametrize("leader", [(LEADER[0] + 0.01, LEADER[1]), (LEADER[0], LEADER[1] + 0.01)])
+def test_a_leader_that_drives_along_an_axis_has_not_frozen(leader: tuple[float, float]) -> None:
+    check = carried(check_at(HERE), OWN, OWN, DT)
+    assert judged(at(THERE, leader), check, leader_moves=True) == BELIEVED
+
+
+def test_a_frozen_leader_stays_so_though_it_seems_to_stand_until_its_place_changes() -> None:
+    check = carried(check_at(HERE), OWN, OWN, DT)
+    check, cause = checked(check, at(THERE), NOISE, GATE, True)
+    assert (cause, check.leader_frozen) == (Cause.FROZEN, True)
+    check, cause = checked(carried(check, STANDS, STANDS, DT), at(THERE), NOISE, GATE, False)
+    assert cause == Cause.FROZEN
+    moved = (LEADER[0], LEADER[1] + 1e-6)
+    check, cause = checked(carried(check, STANDS, STANDS, DT), at(THERE, moved), NOISE, GATE, False)
+    assert (cause, check.leader_frozen) == (BELIEVED, False)
+
+
+@pytest.mark.parametrize("part", ["x", "y", "theta"])
+def test_a_pose_that_repeats_in_part_is_a_new_one(part: str) -> None:
+    """The rest of it takes the place of what was carried on."""
+    check = carried(check_at(HERE, (9.0, 9.0)), STANDS, STANDS, DT)
+    seen = HERE._replace(**{part: getattr(HERE, part) + 1e-9})
+    after = checked(check, at(seen), NOISE, GATE, False).check
+    assert (after.pose, after.sd_position, after.sd_heading) == (seen, 0.0, 0.0)
+    again = checked(check, at(HERE), NOISE, GATE, False).check
+    assert again.sd_position == check.sd_position > 0.0
+
+
+def test_a_heading_turned_round_where_the_place_is_wrong_too_is_an_outlier() -> None:
+    off = THERE._replace(x=THERE.x + 0.05, theta=THERE.theta + math.pi)
+    assert judged(at(off)) == Cause.FOLLOWER

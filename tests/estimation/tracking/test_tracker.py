@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, is_dataclass
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from estimation.filters.belief import Model
 from estimation.filters.estimators import ESTIMATORS, make_estimator, settling
@@ -22,10 +23,23 @@ from estimation.models.measurement import (
 from estimation.tracking.estimate import Estimate, estimate_at
 from estimation.tracking.follower_check import Cause
 from estimation.tracking.track import Track, Tracker
-from estimation.tracking.track_point import Verdict
-from estimation.tracking.tracker import Status, TrackSettings
+from estimation.tracking.track_point import JumpUncertainty, TrackPoint, Verdict
+from estimation.tracking.tracker import (
+    Status,
+    TrackSettings,
+    add,
+    capture_at,
+    gate_of,
+    place_of,
+    point_at,
+    reprocessed,
+    status_of,
+    with_motion,
+)
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
+from formation.records import rows_of, store
+from formation.ring import EMPTY
 from formation.shape import shape_of
 
 RATE = 120.0
@@ -381,3 +395,76 @@ def test_a_follower_may_be_off_by_what_its_noise_and_motion_leave_in_any_directi
             after, verdict = of.add(track, measure_world(at_ns, (leader.x, leader.y), pose, NOISE, measured))
             assert after[-1].cause == expected
             assert verdict is (Verdict.USED if expected is Cause.NONE else Verdict.GATED)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.99, 0.9999])
+def test_the_gate_lets_its_share_of_good_measurements_pass(share: float) -> None:
+    assert gate_of(TrackSettings(gate_probability=share)) == pytest.approx(chi2.ppf(share, 2), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("silent_ns", "verdict", "settled", "status"),
+    [
+        (0, Verdict.USED, True, Status.TRACKING),
+        (0, Verdict.USED, False, Status.INITIALISING),
+        (0, Verdict.RESTARTED, True, Status.TRACKING),
+        (0, Verdict.GATED, True, Status.REJECTING),
+        (250_000_000, Verdict.USED, True, Status.TRACKING),
+        (250_000_001, Verdict.USED, True, Status.COASTING),
+        (250_000_001, Verdict.USED, False, Status.COASTING),
+        (250_000_001, Verdict.GATED, True, Status.REJECTING),
+        (1_000_000_000, Verdict.USED, True, Status.COASTING),
+        (1_000_000_001, Verdict.USED, True, Status.LOST),
+        (1_000_000_001, Verdict.GATED, True, Status.LOST),
+    ],
+)
+def test_what_a_status_says_first_is_what_must_be_known_first(
+    silent_ns: int, verdict: Verdict, settled: bool, status: Status
+) -> None:
+    of = tracker("ekf", FrontEnd.WORLD)
+    begun = of.begin(drive(FrontEnd.WORLD, 1, 1).measurements[0])
+    point = begun._replace(verdict=verdict.value, settled=settled)
+    assert status_of(point, EPOCH_NS + silent_ns, TrackSettings()) == status
+
+
+def test_a_jump_stays_uncertain_for_two_seconds() -> None:
+    run, of = drive(FrontEnd.WORLD, 2, 2), tracker("ekf", FrontEnd.WORLD)
+    due_ns = EPOCH_NS + FRAME_NS
+    for since_ns, lasts in ((due_ns - 2_000_000_000, True), (due_ns - 2_000_000_001, False)):
+        jump = JumpUncertainty(0.1, 0.2, since_ns)
+        point = of.begin(run.measurements[0])._replace(jump=jump)
+        assert of.follow(point, run.measurements[1]).jump == (jump if lasts else JumpUncertainty(0.0, 0.0, 0))
+
+
+def test_the_ring_holds_its_window_and_the_point_before() -> None:
+    of, rows, ring = tracker("ekf", FrontEnd.WORLD), rows_of(TrackPoint, 64), EMPTY
+    captures: list[int] = []
+    # Two frames are missing, so that points lie at the edge of the window and just beyond it.
+    for k, measurement in enumerate(drive(FrontEnd.WORLD, 1, 90).measurements):
+        if k in (30, 31):
+            continue
+        at_ns = EPOCH_NS + k * 10_000_000
+        captures.append(at_ns)
+        ring, verdict, _ = add(rows, ring, measurement._replace(capture_ns=at_ns), of.settings, of.estimator)
+        assert verdict in (Verdict.USED, Verdict.RESTARTED)
+        within = [each for each in captures if each >= at_ns - 200_000_000]
+        expected = captures[-min(len(within) + 1, len(captures)) :]
+        assert [capture_at(rows, ring, j) for j in range(ring.length)] == expected
+        for moment_ns in (expected[0] - 1, expected[0], at_ns - 15_000_000, at_ns, at_ns + 1):
+            assert place_of(rows, ring, moment_ns) == sum(each < moment_ns for each in expected)
+
+
+def test_what_has_changed_in_place_is_folded_anew_from_there() -> None:
+    run, of = drive(FrontEnd.BODY, 3, 12), tracker("ekf", FrontEnd.BODY)
+    other = FollowerMotion(0.09, -0.2, 4e-3, 2e-2)
+    changed = [
+        each._replace(motion=other) if k in (7, 9) else each for k, each in enumerate(run.measurements)
+    ]
+    rows, ring = rows_of(TrackPoint, 16), EMPTY
+    for measurement in run.measurements:
+        ring = add(rows, ring, measurement, of.settings, of.estimator).ring
+    for k in (7, 9):
+        store(rows, k, with_motion(point_at(rows, ring, k), other))
+    assert reprocessed(rows, ring, 7, of.settings, of.estimator) == 5
+    expected, _ = folded(of, changed)
+    assert tuple(point_at(rows, ring, k) for k in range(12))[1:] == expected[1:]

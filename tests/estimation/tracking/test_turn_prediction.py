@@ -103,3 +103,11 @@ def test_an_estimate_heard_again_changes_nothing() -> None:
 def test_nonsense_is_refused(k_u: float, diffusion: float) -> None:
     with pytest.raises(ValueError, match="expected a positive finite number"):
         TurnPrediction.of(k_u, diffusion)
+
+
+def test_before_anything_is_seen_the_leader_swings_to_its_limit() -> None:
+    swing = 0.7 * np.sin(np.linspace(0.0, 2.0 * math.pi, 1000, endpoint=False))
+    made = TurnPrediction.of(0.7, 0.245)
+    assert (made.k_u, made.diffusion) == (0.7, 0.245)
+    assert made.spread == pytest.approx(np.mean(swing**2))
+    assert not NO_TREND.known

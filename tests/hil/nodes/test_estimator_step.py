@@ -20,6 +20,7 @@ from estimation.own_motion.own_track import OwnNoise, OwnPoint
 from estimation.tracking.follower_check import Cause
 from estimation.tracking.track_point import TrackPoint, Verdict
 from estimation.tracking.tracker import TrackSettings
+from formation.kernel import compiles
 from formation.lending import lent
 from formation.pose import Pose, advance
 from formation.records import Rows, columns_of, load, rows_of, store
@@ -95,7 +96,7 @@ class Estimator:
             points=rows_of(TrackPoint, room), own=rows_of(OwnPoint, room), history=rows_of(MotionSample, room)
         )
         self._steps = PLAIN if plain else COMPILED
-        self._lent = cast("Rows[Desk]", [self.desk]) if plain else lent(self.desk)
+        self._lent = cast("Rows[Desk]", [self.desk]) if plain or not compiles() else lent(self.desk)
 
     def take(self, message: Message, now_ns: int) -> Outcome | None:
         if isinstance(message, MotionSample):
