@@ -267,10 +267,10 @@ def sampled(world: World, lab: Lab, memory: Memory, slot: int) -> World:
         store(memory.odometry, slot * robots + k, Odometry(seen_pose(pose_of(robot)), measured))
     next_ns = world.begun_ns + whole_ns((number + 1) / lab.odometry_rate)
     world = world._replace(samples=number + 1, sample_due_ns=next_ns)
-    estimated_ns = at_ns + whole_ns(error.delay)
-    if estimated_ns == at_ns:
+    arrives_ns = at_ns + whole_ns(error.delay)
+    if arrives_ns == at_ns:
         return world
-    item = Underway(estimated_ns, number, ODOMETRY, at_ns, estimated_ns, slot)
+    item = Underway(arrives_ns, number, ODOMETRY, at_ns, arrives_ns, slot)
     return world._replace(underway=sent_off(world.underway, memory.underway, item))
 
 
