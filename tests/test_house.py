@@ -229,3 +229,13 @@ def test_the_wheel_holds_the_four_packages_the_scenarios_and_the_maps(tmp_path: 
     rest = held - data - sources
     assert {Path(name).name for name in rest} <= {"py.typed"}
     assert {"METADATA", "RECORD", "entry_points.txt", "licenses/LICENSE"} <= records
+
+
+def test_set_up_compiles_all_that_is_entered_from_python() -> None:
+    """What it forgets, the first run would wait for."""
+    text = (ROOT / "scripts" / "setup").read_text(encoding="utf-8")
+    for package in PACKAGES:
+        for path in (ROOT / package).rglob("*.py"):
+            if re.search(r"^@entry$", path.read_text(encoding="utf-8"), re.MULTILINE):
+                module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+                assert module in text, f"{module} has entries; name it in scripts/setup"
