@@ -128,7 +128,7 @@ def least_deviations(
     if not np.all(np.isfinite(leader)) or not np.all(np.isfinite(motion)):
         return {}
     moments = truth.capture_ns[near]
-    measured = np.isin(moments, received_ns)
+    measured = _marked(moments, received_ns)
     path = TruePath(moments, leader, truth.follower[near], motion, measured)
     wanted = np.zeros(len(moments), dtype=np.bool_)
     wanted[_nearest(moments, columns.samples.capture_ns)[::EVERY]] = True
@@ -142,8 +142,18 @@ def _nearest(moments_ns: Stamps, wanted_ns: Stamps) -> NDArray[np.int64]:
     before = np.maximum(after - 1, 0)
     nearer = np.abs(moments_ns[after] - wanted_ns) <= np.abs(moments_ns[before] - wanted_ns)
     rows = np.where(nearer, after, before)
-    found: NDArray[np.int64] = np.unique(rows[np.abs(moments_ns[rows] - wanted_ns) <= _SAME_NS])
-    return found
+    is_found = np.zeros(len(moments_ns), dtype=np.bool_)
+    is_found[rows[np.abs(moments_ns[rows] - wanted_ns) <= _SAME_NS]] = True
+    return np.flatnonzero(is_found)
+
+
+def _marked(moments_ns: Stamps, others_ns: Stamps) -> NDArray[np.bool_]:
+    """Which of the increasing moments are among others, in whatever order these are."""
+    among = np.zeros(len(moments_ns), dtype=np.bool_)
+    rows = np.searchsorted(moments_ns, others_ns)
+    others_ns, rows = others_ns[rows < len(moments_ns)], rows[rows < len(moments_ns)]
+    among[rows[moments_ns[rows] == others_ns]] = True
+    return among
 
 
 def _model(scenario: Scenario) -> Model:
