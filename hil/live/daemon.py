@@ -1,4 +1,4 @@
-"""Nodes, live: the wire and the clock on one side, the pure steps on the other."""
+"""Nodes, live: the wire and the clock on one side, their steps on the other."""
 
 from __future__ import annotations
 

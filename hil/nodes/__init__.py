@@ -1,1 +1,1 @@
-"""The pure steps of estimator and controller."""
+"""The steps of estimator and controller: state and event in, messages out, without a clock or a socket."""
