@@ -7,10 +7,8 @@ held by ``tests/formation/test_kernel.py``.
 
 from __future__ import annotations
 
-import contextlib
-import gc
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -19,6 +17,7 @@ from numba.core.typing.templates import make_overload_method_template
 from numba.extending import infer_getattr, overload
 
 from formation import records
+from formation.collector import collector_paused
 from formation.compile_cache import cache_of, one_at_a_time
 from formation.compiled_records import record_type, teach_records
 from formation.kernel_linking import EntryCompiler, KernelCompiler
@@ -59,7 +58,8 @@ def compiled(function: Callable[..., Any]) -> Any:
     cache = cache_of(function)
     if cache is not None:
         dispatcher._cache = cache
-    with one_at_a_time(function.__module__), _collector_paused():
+    # Compiling makes millions of objects that live to its end: looking through them takes a fifth of it.
+    with one_at_a_time(function.__module__), collector_paused():
         dispatcher.compile(signature)
     dispatcher.disable_compile()
     # Called by itself it takes a fifth of the time: the dispatcher would look up the type of every argument.
@@ -68,18 +68,6 @@ def compiled(function: Callable[..., Any]) -> Any:
     PLAIN[direct] = function
     DISPATCHERS[direct] = dispatcher
     return direct
-
-
-@contextlib.contextmanager
-def _collector_paused() -> Iterator[None]:
-    """Compiling makes millions of objects that live to its end: looking through them takes a fifth of it."""
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
 
 
 def _teach_new() -> None:

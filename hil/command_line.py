@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import click
 
+from formation.collector import collector_paused
 from hil import __version__
-from hil.commands.collector import collector_paused
 from hil.errors import AbreastError
 
 COMMANDS = {

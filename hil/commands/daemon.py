@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hil.commands.collector import collector_paused
+from formation.collector import collector_paused
 from hil.commands.seconds import DURATION
 from hil.errors import UsageError
 from hil.scenario.certify import CERTIFY

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hil.commands.collector import collector_paused
+from formation.collector import collector_paused
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
 from hil.log.report_json import print_json

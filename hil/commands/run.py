@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from hil.commands.collector import collector_paused
+from formation.collector import collector_paused
 from hil.commands.seconds import DURATION
 from hil.errors import CheckFailedError, UsageError
 from hil.log.report_json import print_json

@@ -4,7 +4,7 @@ import gc
 
 import pytest
 
-from hil.commands.collector import collector_paused
+from formation.collector import collector_paused
 
 
 def test_the_collector_is_off_within_and_then_as_before() -> None:
