@@ -21,7 +21,6 @@ from hil.wire.cdr import (
 from hil.wire.records import Body, FrameHead, Placement, Stamp
 
 _NOWHERE = Placement(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-_MARKER_HEAD_BYTES = 8
 _POINT_BYTES = 24
 
 
