@@ -14,6 +14,7 @@ from hil.judge.chain_pairs import driven_trajectory
 from hil.judge.chain_summary import summarise_chain
 from hil.judge.chain_text import print_chain
 from hil.judge.replay_verdict import (
+    Played,
     evaluated,
     parity_json,
     refuse_other_steps,
@@ -26,7 +27,8 @@ from hil.log.metadata import scenario_of
 from hil.log.reader import Log
 from hil.log.report_json import print_json, write_json
 from hil.replay.estimate_csv import write_estimates
-from hil.replay.rerun import replay_chain
+from hil.replay.log_replay import kept_replays
+from hil.replay.rerun import linked, replay_chain
 from hil.reports.judged_log import made_folder
 from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
@@ -63,7 +65,8 @@ def replay_run(log: Log, chosen: Scenario, wishes: Wishes) -> None:
     own = scenario_of(log)
     if wishes.verify and own is not None:
         refuse_other_steps(chosen, own)
-    played = replay_chain(log, chosen)
+    kept = kept_replays(log, linked(log, chosen))
+    played: Sequence[Played] = replay_chain(log, chosen) if kept is None else kept
     runs = [run_data_of_replay(log, each, wishes.from_s, wishes.to_s) for each in played]
     summary = summarise_chain(chosen, runs)
     if wishes.verify:

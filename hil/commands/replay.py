@@ -16,9 +16,10 @@ from hil.reports.judged_log import leave, made_folder
 from hil.scenario.certify import CERTIFY, same_steps
 
 if TYPE_CHECKING:
+    from hil.judge.replay_verdict import Played
     from hil.judge.run_data import RunData
     from hil.log.reader import Log
-    from hil.replay.rerun import Replay
+    from hil.scenario.links import Link
     from hil.scenario.schema import Scenario
 
 
@@ -63,11 +64,11 @@ def command(
     --from and --to are seconds since the leader set off, for imported recordings the source's own time; the
     steps always begin where the log does.
     """
+    from hil.judge.own_motion import judge_own_motion
     from hil.judge.replay_verdict import parity_json, run_data_of_replay, violated_bounds, why_not_same
     from hil.judge.summary import summarise
     from hil.judge.summary_text import print_summary
     from hil.log.reader import read_log
-    from hil.replay.odometry_alignment import judge_own_motion
 
     if from_s is not None and to_s is not None and to_s <= from_s:
         raise UsageError(f"--to {to_s:g}: expected more than --from {from_s:g}")
@@ -82,7 +83,7 @@ def command(
     played = _played(given, chart, estimator, leader, follower, overrides, verify=verify)
     run_data = run_data_of_replay(given, played, from_s, to_s)
     summary = summarise(run_data)
-    if chart is None and (own_motion := judge_own_motion(given, played.scenario)):
+    if chart is None and (own_motion := judge_own_motion(given, played)):
         summary["own_motion"] = own_motion
     if verify:
         summary["parity"] = parity_json(played)
@@ -112,14 +113,14 @@ def _played(
     overrides: Sequence[str],
     *,
     verify: bool,
-) -> Replay:
+) -> Played:
     """Replay of one of our logs, or of another lab's by its topic map."""
     from hil.judge.replay_verdict import refuse_other_steps
     from hil.log.metadata import scenario_of
-    from hil.replay.rerun import replay, replay_foreign, replay_link
+    from hil.replay.rerun import replay, replay_foreign
     from hil.replay.topic_map import load_topic_map
     from hil.scenario.files import with_overrides
-    from hil.scenario.links import chain_of, link_of
+    from hil.scenario.links import Link, chain_of, link_of
 
     kind = [*overrides] if estimator is None else [*overrides, f"estimator.kind={estimator}"]
     if chart is not None:
@@ -134,7 +135,7 @@ def _played(
         link, was = link_of(with_overrides(own, kind), follower), link_of(own, follower)
         if verify:
             refuse_other_steps(link.scenario, was.scenario)
-        return replay_link(log, link, was)
+        return _in_one_pass(log, link, was)
     names = {"leader.name": leader, "follower.name": follower}
     renamed = [f"{key}={name}" for key, name in names.items() if name is not None]
     chosen = with_overrides(own, [*kind, *renamed])
@@ -144,7 +145,16 @@ def _played(
             f"{own.leader.name!r} and follower {own.follower.name!r}, with the log's own settings; leave out "
             "what changes that"
         )
-    return replay(log, chosen)
+    return _in_one_pass(log, Link(chosen), Link(own))
+
+
+def _in_one_pass(log: Log, link: Link, was: Link) -> Played:
+    """Replay of one follower, message by message where it cannot be done in one pass."""
+    from hil.replay.log_replay import kept_replays
+    from hil.replay.rerun import replay_link
+
+    kept = kept_replays(log, [(link, was)])
+    return replay_link(log, link, was) if kept is None else kept[0]
 
 
 def _chain(

@@ -53,12 +53,18 @@ def entries_in_order(
         del waiting[:ready]
 
 
-def _entries(stream: BinaryIO, offset: int, wanted: Callable[[int, int], bool]) -> Iterator[Entry]:
+def chunk_data(stream: BinaryIO, offset: int) -> bytes:
+    """Records of the chunk at an offset of a file; raises as :func:`entries_in_order`."""
     stream.seek(offset + _RECORD.size)
     chunk = Chunk.read(ReadDataStream(stream))
     uncompressed, size = get_chunk_data_stream(chunk, validate_crc=True)
-    data = uncompressed.read(size)
-    at = 0
+    data: bytes = uncompressed.read(size)
+    return data
+
+
+def _entries(stream: BinaryIO, offset: int, wanted: Callable[[int, int], bool]) -> Iterator[Entry]:
+    data = chunk_data(stream, offset)
+    at, size = 0, len(data)
     while at < size:
         opcode, length = _RECORD.unpack_from(data, at)
         at += _RECORD.size

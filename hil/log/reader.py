@@ -6,7 +6,7 @@ import os
 import struct
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
@@ -59,7 +59,8 @@ class Log:
 
     ``metadata``: metadata records by name. ``topics``: type name by topic. ``encodings``: message encoding
     by topic. ``definitions``: ``ros2msg`` text by type name, where the log has one. ``messages``: how many
-    there are, from ``start_ns`` to ``end_ns`` in log time (both None in a log without messages).
+    there are, from ``start_ns`` to ``end_ns`` in log time (both None in a log without messages). ``counts``:
+    how many by topic, where the log tells.
     """
 
     path: Path
@@ -71,6 +72,7 @@ class Log:
     start_ns: int | None
     end_ns: int | None
     indexed: bool
+    counts: Mapping[str, int] = field(default_factory=dict)
 
     def records(
         self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
@@ -80,16 +82,10 @@ class Log:
         Only those of the given topics (None: all) logged at ``start_ns`` or later and before ``end_ns``.
         Raises :class:`UsageError` if the log is damaged, or if a topic is not encoded as CDR.
         """
-        for topic in self.topics if topics is None else topics:
-            encoding = self.encodings.get(topic, "cdr")
-            if encoding != "cdr":
-                raise UsageError(
-                    f"log {self.path}: topic {topic!r} is encoded as {encoding!r}, expected 'cdr'; "
-                    "convert the log to ROS 2 or leave the topic out"
-                )
+        self.check_encodings(self.topics if topics is None else topics)
         if start_ns is not None and end_ns is not None and end_ns <= start_ns:
             return
-        with _reading(self.path) as stream:
+        with reading(self.path) as stream:
             summary = SeekingReader(stream, validate_crcs=True).get_summary() if self.indexed else None
             if summary is not None and summary.chunk_indexes:
                 yield from _indexed(stream, summary, topics, start_ns, end_ns)
@@ -105,6 +101,16 @@ class Log:
                     message.log_time,
                     message.publish_time,
                     message.sequence,
+                )
+
+    def check_encodings(self, topics: Collection[str]) -> None:
+        """Raise :class:`UsageError` if one of the topics is not encoded as CDR."""
+        for topic in topics:
+            encoding = self.encodings.get(topic, "cdr")
+            if encoding != "cdr":
+                raise UsageError(
+                    f"log {self.path}: topic {topic!r} is encoded as {encoding!r}, expected 'cdr'; "
+                    "convert the log to ROS 2 or leave the topic out"
                 )
 
     def decode(self, record: Record) -> Message:
@@ -155,17 +161,19 @@ def read_log(path: Path) -> Log:
     Raises :class:`UsageError` if it is missing, a folder, not MCAP, cut off or damaged.
     """
     check_mcap(path)
-    with _reading(path) as stream:
+    with reading(path) as stream:
         _refuse_cut_off(stream, path)
         reader = SeekingReader(stream)
         summary = reader.get_summary()
         indexed = bool(summary and summary.statistics and summary.channels and summary.schemas)
         if summary is not None and summary.statistics is not None and indexed:
             schemas, channels = summary.schemas, summary.channels
+            counts = summary.statistics.channel_message_counts
             messages = summary.statistics.message_count
             start_ns, end_ns = summary.statistics.message_start_time, summary.statistics.message_end_time
         else:
             schemas, channels, messages, start_ns, end_ns = _scan(stream)
+            counts = {}
         stream.seek(0)
         metadata = {record.name: dict(record.metadata) for record in SeekingReader(stream).iter_metadata()}
         ordered = [channels[number] for number in sorted(channels)]
@@ -183,7 +191,17 @@ def read_log(path: Path) -> Log:
             start_ns=start_ns if messages else None,
             end_ns=end_ns if messages else None,
             indexed=indexed,
+            counts=_by_topic(counts, channels),
         )
+
+
+def _by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> dict[str, int]:
+    found: dict[str, int] = {}
+    for number, count in counts.items():
+        if number in channels:
+            topic = channels[number].topic
+            found[topic] = found.get(topic, 0) + count
+    return found
 
 
 def check_mcap(path: Path) -> None:
@@ -208,17 +226,20 @@ def check_mcap(path: Path) -> None:
 
 
 @contextmanager
-def _reading(path: Path) -> Iterator[BinaryIO]:
+def reading(path: Path) -> Iterator[BinaryIO]:
+    """The bytes of a log; raises :class:`UsageError` for what it cannot be read for, damage included."""
     try:
         with path.open("rb") as stream:
             yield stream
     except OSError as error:
         raise UsageError(f"log {path}: cannot be read ({error.strerror or error})") from None
     except DAMAGE as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise UsageError(
-            f"log {path}: is damaged ({reason}); save what is whole with: abreast recover"
-        ) from None
+        raise damaged(path, " ".join(str(error).split()) or type(error).__name__) from None
+
+
+def damaged(path: Path, reason: str) -> UsageError:
+    """The error for a log whose bytes are not as they were written."""
+    return UsageError(f"log {path}: is damaged ({reason}); save what is whole with: abreast recover")
 
 
 def _refuse_cut_off(stream: BinaryIO, path: Path) -> None:
