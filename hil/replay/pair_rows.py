@@ -53,7 +53,7 @@ class Capacity(NamedTuple):
     driven: int
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Nodes:
     """The nodes of a follower and their states."""
 
