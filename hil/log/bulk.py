@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import struct
 import threading
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from queue import Full, Queue
 from typing import NamedTuple
 
 from mcap.opcode import Opcode
-from mcap.reader import SeekingReader
-from mcap.records import ChunkIndex
 
 from hil.log.events import logged_records
 from hil.log.mcap_order import chunk_data
@@ -48,24 +46,20 @@ def in_bulk(log: Log, names: Collection[str]) -> Bulk:
     Raises :class:`UsageError` as :meth:`Log.records`, some of it once batches are taken.
     """
     log.check_encodings([name for name in names if name in log.topics])
-    if log.indexed and topics.MALFORMED not in log.topics:
-        with reading(log.path) as stream:
-            summary = SeekingReader(stream, validate_crcs=True).get_summary()
-        if summary is not None and summary.chunk_indexes:
-            known = {number: channel.topic for number, channel in summary.channels.items()}
-            return Bulk(known, _ahead(_of_chunks(log, summary.chunk_indexes)))
+    if log.chunks and topics.MALFORMED not in log.topics:
+        known = {number: topic for number, (topic, _) in log.channels.items()}
+        return Bulk(known, _ahead(_of_chunks(log)))
     numbered = dict(enumerate(sorted(names)))
     return Bulk(numbered, _ahead(_of_records(log, numbered)))
 
 
-def _of_chunks(log: Log, indexes: Sequence[ChunkIndex]) -> Iterator[Batch]:
+def _of_chunks(log: Log) -> Iterator[Batch]:
     """Chunks in the order of their first messages, several at a time."""
-    ordered = sorted(indexes, key=lambda chunk: (chunk.message_start_time, chunk.chunk_start_offset))
-    ends = [*(chunk.message_start_time for chunk in ordered[1:]), _END_OF_TIME]
+    ends = [*(chunk.first_ns for chunk in log.chunks[1:]), _END_OF_TIME]
     gathered: list[bytes] = []
     with reading(log.path) as stream:
-        for chunk, until_ns in zip(ordered, ends, strict=True):
-            gathered.append(chunk_data(stream, chunk.chunk_start_offset))
+        for chunk, until_ns in zip(log.chunks, ends, strict=True):
+            gathered.append(chunk_data(stream, chunk.offset))
             if sum(map(len, gathered)) >= _BATCH_BYTES or until_ns == _END_OF_TIME:
                 yield Batch(b"".join(gathered), until_ns)
                 gathered.clear()

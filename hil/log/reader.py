@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
 from mcap.exceptions import McapError
-from mcap.reader import NonSeekingReader, SeekingReader
+from mcap.reader import NonSeekingReader
 from mcap.records import Channel, Schema
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
-from mcap.summary import Summary
 from zstandard import ZstdError
 
 from hil.errors import UsageError
 from hil.log.mcap_chunks import MAGIC
 from hil.log.mcap_order import entries_in_order
+from hil.log.mcap_summary import ChunkPlace, read_metadata, read_summary
 from hil.wire.message_types import Message
 from hil.wire.messages import decode, typestore_of
 
@@ -60,7 +60,8 @@ class Log:
     ``metadata``: metadata records by name. ``topics``: type name by topic. ``encodings``: message encoding
     by topic. ``definitions``: ``ros2msg`` text by type name, where the log has one. ``messages``: how many
     there are, from ``start_ns`` to ``end_ns`` in log time (both None in a log without messages). ``counts``:
-    how many by topic, where the log tells.
+    how many by topic, where the log tells. ``channels``: topic and type name by channel id. ``chunks``: in
+    the order of their first messages, none in a log without an index.
     """
 
     path: Path
@@ -71,7 +72,8 @@ class Log:
     messages: int
     start_ns: int | None
     end_ns: int | None
-    indexed: bool
+    channels: Mapping[int, tuple[str, str]]
+    chunks: Sequence[ChunkPlace] = field(repr=False)
     counts: Mapping[str, int] = field(default_factory=dict)
 
     def records(
@@ -86,11 +88,9 @@ class Log:
         if start_ns is not None and end_ns is not None and end_ns <= start_ns:
             return
         with reading(self.path) as stream:
-            summary = SeekingReader(stream, validate_crcs=True).get_summary() if self.indexed else None
-            if summary is not None and summary.chunk_indexes:
-                yield from _indexed(stream, summary, topics, start_ns, end_ns)
+            if self.chunks:
+                yield from _indexed(stream, self, topics, start_ns, end_ns)
                 return
-            stream.seek(0)
             for schema, channel, message in NonSeekingReader(stream, validate_crcs=True).iter_messages(
                 topics=topics, starting_at=start_ns, ending_before=end_ns
             ):
@@ -123,19 +123,13 @@ class Log:
 
 
 def _indexed(
-    stream: BinaryIO,
-    summary: Summary,
-    topics: Collection[str] | None,
-    start_ns: int | None,
-    end_ns: int | None,
+    stream: BinaryIO, log: Log, topics: Collection[str] | None, start_ns: int | None, end_ns: int | None
 ) -> Iterator[Record]:
     first, last = 0 if start_ns is None else start_ns, _END_OF_TIME if end_ns is None else end_ns
     channels = {
-        number: (channel.topic, _typename(summary.schemas[channel.schema_id] if channel.schema_id else None))
-        for number, channel in summary.channels.items()
-        if topics is None or channel.topic in topics
+        number: known for number, known in log.channels.items() if topics is None or known[0] in topics
     }
-    others = summary.channels.keys() - channels.keys()
+    others = log.channels.keys() - channels.keys()
 
     def wanted(channel_id: int, log_ns: int) -> bool:
         if channel_id not in channels and channel_id not in others:
@@ -144,11 +138,8 @@ def _indexed(
 
     chunks = [
         chunk
-        for chunk in summary.chunk_indexes
-        if chunk.message_end_time >= first
-        and chunk.message_start_time < last
-        # Without an index of its own a chunk may hold anything.
-        and not (chunk.message_index_offsets and channels.keys().isdisjoint(chunk.message_index_offsets))
+        for chunk in log.chunks
+        if chunk.last_ns >= first and chunk.first_ns < last and chunk.may_hold(channels)
     ]
     for entry in entries_in_order(stream, chunks, wanted):
         topic, typename = channels[entry.channel_id]
@@ -163,8 +154,7 @@ def read_log(path: Path) -> Log:
     check_mcap(path)
     with reading(path) as stream:
         _refuse_cut_off(stream, path)
-        reader = SeekingReader(stream)
-        summary = reader.get_summary()
+        summary = read_summary(stream)
         indexed = bool(summary and summary.statistics and summary.channels and summary.schemas)
         if summary is not None and summary.statistics is not None and indexed:
             schemas, channels = summary.schemas, summary.channels
@@ -174,8 +164,12 @@ def read_log(path: Path) -> Log:
         else:
             schemas, channels, messages, start_ns, end_ns = _scan(stream)
             counts = {}
-        stream.seek(0)
-        metadata = {record.name: dict(record.metadata) for record in SeekingReader(stream).iter_metadata()}
+        if summary is not None:
+            records = [read_metadata(stream, index) for index in summary.metadata]
+        else:
+            stream.seek(0)
+            records = list(NonSeekingReader(stream).iter_metadata())
+        metadata = {record.name: dict(record.metadata) for record in records}
         ordered = [channels[number] for number in sorted(channels)]
         return Log(
             path=path,
@@ -190,7 +184,10 @@ def read_log(path: Path) -> Log:
             messages=messages,
             start_ns=start_ns if messages else None,
             end_ns=end_ns if messages else None,
-            indexed=indexed,
+            channels={
+                channel.id: (channel.topic, _typename(schemas.get(channel.schema_id))) for channel in ordered
+            },
+            chunks=tuple(summary.chunks) if summary is not None and indexed else (),
             counts=_by_topic(counts, channels),
         )
 

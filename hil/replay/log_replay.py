@@ -137,6 +137,9 @@ class LogReplay:
 
     def _go_on(self) -> None:
         go_on(self.window.lent, self._pairs, self._stages, self._records)
+        self._see_asides()
+
+    def _see_asides(self) -> None:
         for topic, log_ns, payload in self.window.asides():
             if topic == topics.DIAGNOSTICS:
                 self._reports.hear(payload)

@@ -53,7 +53,7 @@ class WindowRows:
         self._lend()
 
     def _lend(self) -> None:
-        self._record = Window(
+        self.record = Window(
             self._arena,
             self.logged,
             self._slots,
@@ -63,7 +63,7 @@ class WindowRows:
             self._channels,
             self._asides,
         )
-        self.lent: Rows[Window] = lent(self._record)
+        self.lent: Rows[Window] = lent(self.record)
 
     @property
     def room(self) -> int:
