@@ -56,7 +56,7 @@ COMPILER = {"formation/kernel.py", "formation/compile_cache.py"}
 
 COMPILES = {
     "formation/compiler.py", "formation/compiled_records.py", "formation/compile_cache.py",
-    "formation/kernel_linking.py",
+    "formation/kernel_linking.py", "formation/compiled_calls.py",
 }  # fmt: skip
 """What alone may import numba: all else is plain Python, which runs without it."""
 
