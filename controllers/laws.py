@@ -20,7 +20,7 @@ from typing import NamedTuple, Protocol
 
 from controllers.limits import Limits, clip
 from controllers.own_law import OwnLaw, asked_law
-from formation.first_class import NOWHERE, Address
+from formation.address import NOWHERE, Address
 from formation.kernel import kernel
 from formation.line import Line, line_of
 from formation.pose import Motion

@@ -10,12 +10,14 @@ in several processes, asks it anew.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections import namedtuple
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from formation.first_class import Address, FirstClass, called
+from formation.address import Address, called
+from formation.first_class import FirstClass
 from formation.kernel import kernel
 from formation.line import Line
 from formation.pose import Motion
@@ -94,8 +96,15 @@ class OwnLaw:
                     f"taken are {', '.join(GIVEN)}"
                 )
         self.name = name
+        self._names = tuple(given)
         self._parameters = tuple(map(float, given.values()))
         self._called = FirstClass(function, (SeenShape, Leader), gains_type(tuple(given)))
+
+    def with_parameters(self, parameters: Mapping[str, float]) -> OwnLaw:
+        """The same law, compiled code and counts shared, with other values of its parameters."""
+        other = copy.copy(self)
+        other._parameters = tuple(float(parameters[name]) for name in self._names)
+        return other
 
     @property
     def why_not_compiled(self) -> str:

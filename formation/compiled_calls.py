@@ -12,7 +12,7 @@ from numba import carray, cfunc, njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
-from formation.first_class import called
+from formation.address import called
 
 _FLOATS = types.CPointer(types.float64)
 _PAIR = types.UniTuple(types.float64, 2)
@@ -45,7 +45,7 @@ def _call(typing_context: Any, function: Any, numbers: Any, asked: Any) -> Any:
 
 
 def teach_calls() -> None:
-    """Tell numba what :func:`formation.first_class.called` is."""
+    """Tell numba what :func:`formation.address.called` is."""
     overload(called, strict=False)(lambda *args: _at_an_address)
 
 

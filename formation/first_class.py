@@ -2,7 +2,7 @@
 
 Such a function takes named tuples of floats and returns two floats. What numba can compile is called at the
 cost of a pointer; what it cannot goes back into the interpreter from where it is called, by the same address.
-In plain Python :func:`called` finds the function by that address, too.
+In plain Python :func:`formation.address.called` finds the function by that address, too.
 
 A function that raises, or returns anything but two finite numbers, answers NaN and NaN; how often it did, and
 what it was asked then, stays behind its numbers, so that :meth:`FirstClass.failure` can tell why.
@@ -13,26 +13,16 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from formation.address import ANSWERS, NO_ANSWER, Address
 from formation.kernel import compiles
 
 _ENTERED = ctypes.CFUNCTYPE(ctypes.c_longlong, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 _ANSWER = ctypes.c_double * 2
-_NO_ANSWER = (math.nan, math.nan)
-
-
-class Address(NamedTuple):
-    """Where a function is, and the numbers that are its own; ``function`` 0: there is none."""
-
-    function: int
-    numbers: int
-
-
-NOWHERE = Address(0, 0)
 
 
 class FirstClass:
@@ -58,7 +48,7 @@ class FirstClass:
         if self._entered is None:
             self._entered = _ENTERED(self._enter)
             self.address: int = ctypes.cast(self._entered, ctypes.c_void_p).value or 0
-        _KNOWN[self.address] = self
+        ANSWERS[self.address] = self.answer
 
     @property
     def compiled(self) -> bool:
@@ -85,7 +75,7 @@ class FirstClass:
             pass
         memory[self._own] += 1.0
         memory[self._own + 1 :] = asked
-        return _NO_ANSWER
+        return NO_ANSWER
 
     def failures(self) -> int:
         """How often there was no answer."""
@@ -123,14 +113,3 @@ class FirstClass:
         """What compiled code calls where the function could not be compiled."""
         _ANSWER.from_address(answer)[:] = [*self.answer(self._room.from_address(asked)[:], numbers)]
         return 0
-
-
-_KNOWN: dict[int, FirstClass] = {}
-
-
-def called(at: Address, asked: Any) -> tuple[float, float]:
-    """Answer of the function at an address to a named tuple that holds all that it is asked with.
-
-    Compiled code has this by :mod:`formation.compiled_calls`. Needs an address that is not 0.
-    """
-    return _KNOWN[at.function].answer(asked, at.numbers)

@@ -32,8 +32,8 @@ ROOMS = {
         "models", "own_motion", "time", "filters", "tracking", "bounds", "consistency", "calibration",
     ),
     "hil": (
-        "scenario", "wire", "log", "nodes", "emulator", "lockstep", "live", "replay", "recordings", "judge",
-        "figures", "reports", "sweep", "simulate", "commands",
+        "extensions", "scenario", "wire", "log", "nodes", "emulator", "lockstep", "live", "replay",
+        "recordings", "judge", "figures", "reports", "sweep", "simulate", "commands",
     ),
 }  # fmt: skip
 """Rooms of the packages that have some, lower ones first: each may import those before it."""

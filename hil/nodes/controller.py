@@ -27,7 +27,7 @@ from hil.nodes.controller_entries import control, hear, hear_estimate, refuse
 from hil.nodes.controller_events import NOTHING, STOP, TICK, ControlEvent, Happening, happened
 from hil.nodes.controller_step import ControlState, begun
 from hil.nodes.counting import Count, counts_in
-from hil.nodes.leader_turn import SOURCES, TurnSource
+from hil.nodes.leader_turn import TurnSource, source_of
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
@@ -141,7 +141,7 @@ class ControllerNode:
         self.rules = row_of(NodeRules(control_rules(scenario), *places))
         self.station = station(scenario)
         self.rows = rows_for(scenario.controller.max_age_s + scenario.controller.transport_s)
-        is_told = SOURCES[scenario.controller.law] is TurnSource.TOLD
+        is_told = source_of(scenario.controller.law) is TurnSource.TOLD
         leader = (self.topics.leader_cmd_vel,) if is_told else ()
         self._estimate, self._command = self.topics.estimate, self.topics.command
         self._cmd_vel = self.topics.cmd_vel

@@ -6,21 +6,21 @@ Apart from ``hil.scenario.parts``, as no daemon needs the integrators behind it.
 from __future__ import annotations
 
 from controllers.chain import ChainTrajectory, simulate_chain
-from controllers.laws import LAWS
+from controllers.laws import LAWS, ideal
 from controllers.side_change_run import run_with_changes
 from formation.angles import FloatArray
 from formation.closed_loop import FollowerLaw, Trajectory, simulate_pair
 from formation.pose import Motion
 from formation.shape import Shape
 from hil.scenario.ordered_sides import ordered_sides
-from hil.scenario.parts import gains, knows_turn, leader_program, limits, station_keeper
+from hil.scenario.parts import knows_turn, law_gains, leader_program, limits, station_keeper
 from hil.scenario.schema import Scenario
 from hil.scenario.start import start_poses, start_shape
 
 
 def follower_law(scenario: Scenario) -> FollowerLaw:
     """Law of the scenario with its gains and without limits, as the noise-free simulation takes it."""
-    law, with_gains = LAWS[scenario.controller.law], gains(scenario)
+    law, with_gains = LAWS.get(scenario.controller.law, ideal), law_gains(scenario)
 
     def follower(shape: Shape, v1: float, u1: float) -> Motion:
         return law(shape, v1, u1, with_gains)
@@ -54,7 +54,7 @@ def chain_run(scenario: Scenario, agents: int, times: FloatArray) -> ChainTrajec
         leader,
         [start_shape(scenario)] * (agents - 1),
         leader_program(scenario),
-        gains(scenario),
+        law_gains(scenario),
         limits(scenario),
         times,
         knows_turn=knows_turn(scenario),
