@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import inspect
+import math
 import types as python
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from llvmlite import ir
-from numba import carray, cfunc, njit, types
+from numba import cfunc, njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
 from formation.address import called
 
-_FLOATS = types.CPointer(types.float64)
 _PAIR = types.UniTuple(types.float64, 2)
-_SIGNATURE = types.int64(_FLOATS, _FLOATS, _FLOATS)
+_SIGNATURE = types.int64(types.int64, types.int64, types.int64)
+_DOUBLE, _WORD = ir.DoubleType(), ir.IntType(64)
+_BYTES = 8  # of a float
 _PYTHON_DIVISION = "python"  # so that a division by zero raises whether compiled or not
 
 
@@ -29,19 +31,57 @@ def _call(typing_context: Any, function: Any, numbers: Any, asked: Any) -> Any:
     """Call a C function at an address with what is asked, its numbers, and room for two floats."""
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        double, integer = ir.DoubleType(), ir.IntType(64)
-        size = len(asked)
-        room = cgutils.alloca_once(builder, ir.ArrayType(double, size))
-        for k in range(size):
+        room = cgutils.alloca_once(builder, ir.ArrayType(_DOUBLE, len(asked)))
+        for k in range(len(asked)):
             place = cgutils.gep_inbounds(builder, room, 0, k)
             builder.store(builder.extract_value(args[2], k), place)
-        answer = cgutils.alloca_once(builder, ir.ArrayType(double, 2))
-        pointer = ir.FunctionType(integer, [integer, integer, integer]).as_pointer()
-        entered = builder.inttoptr(args[0], pointer)
-        builder.call(entered, [builder.ptrtoint(room, integer), args[1], builder.ptrtoint(answer, integer)])
+        answer = cgutils.alloca_once(builder, ir.ArrayType(_DOUBLE, 2))
+        entered = builder.inttoptr(args[0], ir.FunctionType(_WORD, [_WORD] * 3).as_pointer())
+        builder.call(entered, [builder.ptrtoint(room, _WORD), args[1], builder.ptrtoint(answer, _WORD)])
         return builder.load(answer)
 
     return _PAIR(types.int64, types.int64, asked), code
+
+
+def _pointer(builder: Any, address: Any, k: int = 0) -> Any:
+    return builder.gep(builder.inttoptr(address, _DOUBLE.as_pointer()), [ir.Constant(_WORD, k)])
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _read(typing_context: Any, address: Any) -> Any:
+    """The float at an address."""
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.load(_pointer(builder, args[0]))
+
+    return types.float64(types.int64), code
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _write(typing_context: Any, address: Any, value: Any) -> Any:
+    """Put a float at an address."""
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        builder.store(args[1], _pointer(builder, args[0]))
+        return context.get_dummy_value()
+
+    return types.none(types.int64, types.float64), code
+
+
+def _reader(kind: type[Any]) -> Any:
+    """What reads a named tuple of floats from an address."""
+    size = len(kind._fields)
+    record = types.NamedUniTuple(types.float64, size, kind)
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def read(typing_context: Any, address: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            values = [builder.load(_pointer(builder, args[0], k)) for k in range(size)]
+            return context.make_tuple(builder, record, values)
+
+        return record(types.int64), code
+
+    return read
 
 
 def teach_calls() -> None:
@@ -58,28 +98,27 @@ def c_function(function: Callable[..., Any], asked: Sequence[type[Any]], numbers
 
     Raises :class:`NotCompiledError` for a function that numba cannot compile.
     """
-    from numba.np.unsafe.ndarray import to_fixed_tuple
-
-    first, second = asked
-    one, other, own = len(first._fields), len(second._fields), len(numbers._fields)
-    size = one + other
+    first, second, own = map(_reader, (*asked, numbers))
+    size = sum(len(kind._fields) for kind in asked)
+    second_at = _BYTES * len(asked[0]._fields)
+    failed_at = _BYTES * len(numbers._fields)
     _teach_neighbours(function, set())
     law = njit(function, error_model=_PYTHON_DIVISION)
 
-    def entered(asked_at: Any, numbers_at: Any, answer_at: Any) -> int:
-        asked, memory = carray(asked_at, size), carray(numbers_at, own + 1 + size)
-        answer = carray(answer_at, 2)
-        given = first(*to_fixed_tuple(asked[:one], one)), second(*to_fixed_tuple(asked[one:], other))
-        v, u = float("nan"), float("nan")
+    def entered(asked_at: int, numbers_at: int, answer_at: int) -> int:
+        v, u = math.nan, math.nan
         try:
-            v, u = law(given[0], given[1], numbers(*to_fixed_tuple(memory[:own], own)))
+            v, u = law(first(asked_at), second(asked_at + second_at), own(numbers_at))
         except Exception:
-            v = float("nan")
-        if not (abs(v) < float("inf") and abs(u) < float("inf")):
-            v, u = float("nan"), float("nan")
-            memory[own] += 1.0
-            memory[own + 1 :] = asked
-        answer[0], answer[1] = v, u
+            v = math.nan
+        if not (math.isfinite(v) and math.isfinite(u)):
+            v, u = math.nan, math.nan
+            counted = numbers_at + failed_at
+            _write(counted, _read(counted) + 1.0)
+            for k in range(size):
+                _write(counted + _BYTES * (k + 1), _read(asked_at + _BYTES * k))
+        _write(answer_at, v)
+        _write(answer_at + _BYTES, u)
         return 0
 
     try:
