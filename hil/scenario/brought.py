@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from msgspec import UnsetType
-from msgspec.structs import replace
 
 from controllers.own_law import OwnLaw
 from hil.errors import UsageError
@@ -39,6 +38,15 @@ def settle_references(tree: dict[str, Any], folder: Path) -> None:
             section[place.key] = settled(text, f"{place.section}.{place.key}", place.group, folder)
 
 
+def settled_references(law: str | None, estimator: str | None) -> dict[str, str | None]:
+    """The same for a law and an estimator that were given as options, by ``law`` and ``estimator``."""
+    given = {"law": (_LAW, law), "estimator": (_ESTIMATOR, estimator)}
+    return {
+        noun: text if text is None or text in place.known else settled(text, f"--{noun}", place.group, Path())
+        for noun, (place, text) in given.items()
+    }
+
+
 def refuse_unknown(scenario: Scenario, source: str) -> None:
     """Raise :class:`UsageError` for a law or an estimator that is neither known nor a reference."""
     for place, text in ((_LAW, scenario.controller.law), (_ESTIMATOR, scenario.estimator.kind)):
@@ -67,10 +75,3 @@ def law_of(scenario: Scenario) -> OwnLaw | None:
     """
     text = scenario.controller.law
     return laws.own_law(text, parameters_of(scenario)) if is_reference(text) else None
-
-
-def with_references(scenario: Scenario, law: str | None, estimator: str | None) -> Scenario:
-    """Scenario with other settled references in the place of its law and its estimator, where given."""
-    controller = scenario.controller if law is None else replace(scenario.controller, law=law)
-    kept = scenario.estimator if estimator is None else replace(scenario.estimator, kind=estimator)
-    return replace(scenario, controller=controller, estimator=kept)
