@@ -22,6 +22,7 @@ from hil.sweep.spec import Sweep, load_sweep
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all noise.")
 @click.option("--duration", type=Seconds(1.0), metavar="S", help="Seconds of every run.")
 @click.option("--estimators", metavar="A,B", help="Estimators, any that a scenario takes.")
+@click.option("--law", metavar="L", help="Law of the follower, file.py:function too, in all cells.")
 @click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key in all cells."
 )
@@ -48,6 +49,7 @@ def command(
     seed: int | None,
     duration: float | None,
     estimators: str | None,
+    law: str | None,
     overrides: tuple[str, ...],
     workers: int | None,
     scheduler: str | None,
@@ -63,6 +65,8 @@ def command(
     from hil.sweep.results import write_results
 
     names = None if estimators is None else [name.strip() for name in estimators.split(",")]
+    if law is not None:
+        overrides = (*overrides, f"controller.law={law}")
     sweep = load_sweep(spec, overrides, runs=runs, seed=seed, duration_s=duration, estimators=names)
     to_keep = [_parsed(sweep, text) for text in kept if text != "worst"]
     folder = out or Path("runs") / f"sweep-{time.strftime('%Y%m%d-%H%M%S')}"

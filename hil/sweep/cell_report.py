@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -29,11 +28,9 @@ def report_cell(cell: Cell, tallies: NDArray[np.void], allowed: tuple[float, flo
     best_count, moments = int(tallies["best_count"].sum()), int(tallies["moments"].sum())
     rmse = {name: _root(each, samples) for name, each in zip(QUANTITIES, squares, strict=True)}
     least = {name: _root(each, best_count) for name, each in zip(QUANTITIES, best, strict=True)}
-    point = asdict(cell)
-    point.pop("index")
     result: dict[str, Any] = known(
         {
-            **point,
+            **cell.point(),
             "runs": len(tallies),
             "samples": samples,
             "untracked": int(tallies["untracked"].sum()),
