@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import Seconds
 from hil.errors import UsageError
 from hil.log.report_json import print_json
@@ -21,7 +22,9 @@ from hil.sweep.spec import Sweep, load_sweep
 @click.option("--runs", type=click.IntRange(min=1), metavar="N", help="Runs of every cell.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all noise.")
 @click.option("--duration", type=Seconds(1.0), metavar="S", help="Seconds of every run.")
-@click.option("--estimators", metavar="A,B", help="Estimators, any that a scenario takes.")
+@click.option(
+    "--estimators", metavar="A,B", help="Estimators, any that a scenario takes, file.py:factory too."
+)
 @click.option("--law", metavar="L", help="Law of the follower, file.py:function too, in all cells.")
 @click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key in all cells."
@@ -68,6 +71,8 @@ def command(
     if law is not None:
         overrides = (*overrides, f"controller.law={law}")
     sweep = load_sweep(spec, overrides, runs=runs, seed=seed, duration_s=duration, estimators=names)
+    for point in sweep.cells()[: len(sweep.spec.estimators)]:
+        load_own_parts(sweep.scenario_of(point))
     to_keep = [_parsed(sweep, text) for text in kept if text != "worst"]
     folder = out or Path("runs") / f"sweep-{time.strftime('%Y%m%d-%H%M%S')}"
     result = _fly(sweep, folder, workers or len(os.sched_getaffinity(0)), scheduler)

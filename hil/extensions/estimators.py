@@ -2,16 +2,74 @@
 
 from __future__ import annotations
 
-from estimation.filters.belief import Model
-from estimation.filters.estimator import Estimator
-from hil.errors import UsageError
-from hil.extensions.reference import found, loaded
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from estimation.filters.belief import Belief, Model
+from estimation.filters.estimator import Estimator, MatrixStep
+from estimation.models.coordinated_turn import FollowerMotion
+from estimation.models.measurement import Measurement
+from hil.errors import CheckFailedError, UsageError
+from hil.extensions.reference import found, loaded, short
 
 GROUP = "abreast.estimators"
 """Entry points by which packages bring estimators."""
 NOUN = "estimator.kind"
 
 _NEEDED = ("start", "predict", "update", "step")
+
+
+class NamedEstimator(Estimator):
+    """An estimator of one's own, whose failures bear its name: they raise :class:`CheckFailedError`.
+
+    That is what it raises itself, and a belief that is not one of the model's state in finite numbers.
+    """
+
+    def __init__(self, estimator: Estimator, model: Model, name: str) -> None:
+        self.model = model
+        self._estimator, self._name = estimator, name
+
+    def start(self, measurement: Measurement) -> Belief:
+        """Belief from the first measurement alone."""
+        return self._sound(self._done(self._estimator.start, measurement))
+
+    def predict(self, belief: Belief, dt: float, follower: FollowerMotion) -> Belief:
+        """Belief after dt [s], the follower having moved as given."""
+        return self._sound(self._done(self._estimator.predict, belief, dt, follower))
+
+    def update(self, belief: Belief, measurement: Measurement) -> Belief:
+        """Belief after a measurement at the belief's time."""
+        return self._sound(self._done(self._estimator.update, belief, measurement))
+
+    def step(
+        self, belief: Belief, dt: float, follower: FollowerMotion, measurement: Measurement, gate: float
+    ) -> MatrixStep:
+        """Belief after dt [s] and a measurement at the end of it, and the NIS of this measurement."""
+        stepped = self._done(self._estimator.step, belief, dt, follower, measurement, gate)
+        try:
+            after, nis = stepped
+            return MatrixStep(self._sound(after), float(nis))
+        except (TypeError, ValueError):
+            raise self._failed(f"step gave {stepped!r}, expected a belief and a NIS") from None
+
+    def _done(self, step: Callable[..., Any], *given: Any) -> Any:
+        try:
+            return step(*given)
+        except Exception as error:  # whatever somebody's estimator may raise
+            what = f"{type(error).__name__}: {error}".splitlines()[0]
+            raise self._failed(f"{step.__name__} raised {what}") from error
+
+    def _sound(self, belief: Any) -> Belief:
+        if not isinstance(belief, Belief):
+            raise self._failed(f"it gave {type(belief).__name__}, expected a Belief")
+        if not (np.all(np.isfinite(belief.mean)) and np.all(np.isfinite(belief.covariance))):
+            raise self._failed(f"its belief is not finite: mean {belief.mean.tolist()}")
+        return belief
+
+    def _failed(self, why: str) -> CheckFailedError:
+        return CheckFailedError(f"estimator {self._name} failed: {why}")
 
 
 def own_estimator(text: str, model: Model) -> Estimator:
@@ -29,9 +87,7 @@ def own_estimator(text: str, model: Model) -> Estimator:
     missing = [name for name in _NEEDED if not callable(getattr(made, name, None))]
     if missing:
         raise UsageError(
-            f"{NOUN} {text}: its factory gave {type(made).__name__}, expected an Estimator; "
-            f"it lacks {', '.join(missing)}: derive it from abreast.Estimator"
+            f"{NOUN} {text}: its factory gave {type(made).__name__}, which lacks {', '.join(missing)}; "
+            "derive it from abreast.Estimator"
         )
-    if getattr(made, "model", None) is None:
-        made.model = model
-    return made  # type: ignore[no-any-return]
+    return NamedEstimator(made, model, short(text))
