@@ -14,6 +14,7 @@ from formation.collector import collector_paused
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION
 from hil.errors import CheckFailedError, UsageError
+from hil.judge.made_by import law_failure
 from hil.log.report_json import print_json
 from hil.reports.judged_log import claimed, judge_log, made_folder
 from hil.scenario.certify import CERTIFY
@@ -85,6 +86,7 @@ def _run(chosen: Scenario, folder: Path, listen: str | None, *, lockstep: bool, 
         if as_json:
             # How long it took is no part of the verdict, which is the same for every run of a seed.
             print_json(summary | timing)
+        failure = failure or law_failure(summary)
     finally:
         # Also if there is no room for a verdict, say: what went wrong first is what to tell.
         if failure:

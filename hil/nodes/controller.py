@@ -28,7 +28,8 @@ from hil.nodes.controller_events import NOTHING, STOP, TICK, ControlEvent, Happe
 from hil.nodes.controller_step import ControlState, begun
 from hil.nodes.counting import Count, counts_in
 from hil.nodes.leader_turn import TurnSource, source_of
-from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
+from hil.nodes.node import LAW_FAILURE, Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
+from hil.scenario.brought import law_of
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
@@ -140,6 +141,7 @@ class ControllerNode:
         places = self.decision.numbers_at, self.drive.numbers_at
         self.rules = row_of(NodeRules(control_rules(scenario), *places))
         self.station = station(scenario)
+        self.law = law_of(scenario)
         self.rows = rows_for(scenario.controller.max_age_s + scenario.controller.transport_s)
         is_told = source_of(scenario.controller.law) is TurnSource.TOLD
         leader = (self.topics.leader_cmd_vel,) if is_told else ()
@@ -216,6 +218,8 @@ class ControllerNode:
         problem = "" if known.heard else "waiting for estimates"
         values: dict[str, object] = {"estimate": Status(known.status).name.lower()}
         values |= _side_report(known.follower.station)
+        if self.law is not None and (failure := self.law.failure()):
+            values[LAW_FAILURE] = failure
         values |= named_counts("decided", state.decided) | named_counts("refused", state.refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
 
