@@ -12,7 +12,7 @@ import click
 
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import Seconds
-from hil.errors import UsageError
+from hil.errors import CheckFailedError, UsageError
 from hil.log.report_json import print_json
 from hil.sweep.spec import Sweep, load_sweep
 
@@ -64,6 +64,7 @@ def command(
 
     Given the same --out again, a sweep that was interrupted goes on. Cells and runs count from 0.
     """
+    from hil.sweep.failed_laws import law_failure
     from hil.sweep.kept_runs import keep_run, worst_runs
     from hil.sweep.results import write_results
 
@@ -84,6 +85,8 @@ def command(
     click.echo(f"results in {folder}, look at {folder / 'report.html'}", err=True)
     if as_json:
         print_json(result)
+    if reason := law_failure(sweep, result):
+        raise CheckFailedError(reason)
 
 
 def _parsed(sweep: Sweep, text: str) -> tuple[int, int]:
