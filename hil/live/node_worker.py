@@ -12,6 +12,8 @@ from hil.wire import topics
 from hil.wire.events import Event
 from hil.wire.message_types import String
 
+_LONGEST_TICK_NS = 1_000_000
+
 
 @dataclass(frozen=True, slots=True)
 class Parting:
@@ -43,7 +45,7 @@ class NodeWorker:
         parting: Parting | None = None,
         clock: Callable[[], int] = time.time_ns,
     ) -> None:
-        # Listeners first: at a tick they have had theirs before they hear, later, of that of another.
+        # Listeners first: where all tick at once they have had theirs before they hear, later, of another's.
         self.nodes = tuple(sorted(nodes, key=lambda node: set(within).isdisjoint(node.subscribes)))
         self._readers = _readers(self.nodes)
         self._within = {topic: self._readers[topic] for topic in within if topic in self._readers}
@@ -66,16 +68,27 @@ class NodeWorker:
     def take(self, event: Event, now_ns: int) -> Iterator[Outgoing]:
         """One step of every node that listens to an arrival or, at a tick, is due.
 
-        At a tick after the clock was set back all are: nobody may wait until it is there again.
+        At a tick after the clock was set back all are: nobody may wait until it is there again. Where the
+        reports of many are due at once, some are left for the next tick: an arrival goes first.
         """
         set_back, self._now_ns = now_ns < self._now_ns, now_ns
         if event.topic:
             for place in self._readers.get(event.topic, ()):
                 yield from self._step(place, event, now_ns)
             return
-        for place in range(len(self.nodes)):
-            if self._dues[place] <= now_ns or set_back:
+        if set_back:
+            for place in range(len(self.nodes)):
                 yield from self._step(place, event, now_ns)
+            return
+        until_ns = self._clock() + _LONGEST_TICK_NS
+        dues = self._dues
+        due = [place for place, due_ns in enumerate(dues) if due_ns <= now_ns]
+        for place in sorted(due, key=dues.__getitem__):
+            # Who has just heard of another's tick needs none any more.
+            if dues[place] <= now_ns:
+                yield from self._step(place, event, now_ns)
+            if self._clock() > until_ns:
+                return
 
     def end(self, now_ns: int) -> Iterator[Outgoing]:
         """The parting stop, if any, and the nodes' final reports."""

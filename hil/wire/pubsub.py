@@ -64,10 +64,9 @@ class Wire:
         A subscriber that cannot follow loses messages rather than holding up everybody else, but for a stop,
         which must arrive.
         """
-        with self._lock:
-            publisher = self._publishers.get(topic)
-            if publisher is None:
-                publisher = self._declare(topic)
+        publisher = self._publishers.get(topic)
+        if publisher is None:
+            publisher = self._declare(topic)
         publisher.put(payload)
 
     def wake(self) -> None:
@@ -84,6 +83,12 @@ class Wire:
         self._publishers.clear()
 
     def _declare(self, topic: str) -> zenoh.Publisher:
+        with self._lock:
+            if (declared := self._publishers.get(topic)) is not None:
+                return declared
+            return self._declared(topic)
+
+    def _declared(self, topic: str) -> zenoh.Publisher:
         urgent = topic in self._urgent
         must_arrive = topic == STOP
         congestion = zenoh.CongestionControl.BLOCK if must_arrive else zenoh.CongestionControl.DROP
