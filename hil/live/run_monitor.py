@@ -127,8 +127,9 @@ class RunMonitor:
 
     def close(self) -> None:
         """End the subscriptions."""
-        for subscriber in (self._diagnostics, *self._newest.values()):
-            subscriber.undeclare()  # type: ignore[no-untyped-call]
+        self._diagnostics.undeclare()  # type: ignore[no-untyped-call]
+        for newest in self._newest.values():
+            newest.undeclare()  # type: ignore[no-untyped-call]
         self._newest.clear()
 
     def _on_diagnostics(self, sample: zenoh.Sample) -> None:
