@@ -200,7 +200,7 @@ class Ear:
         self.heard.append((time.time_ns(), str(sample.key_expr), sample.payload.to_bytes()))
 
     def wait_until_driven(self, followers: int) -> None:
-        """Wait until the last robot has set off: each only knows what its predecessor does once that moves."""
+        """Wait until the last robot has set off: each knows its predecessor only once that moves."""
         until = time.monotonic() + PATIENCE
         while time.monotonic() < until:
             self.heard.clear()
