@@ -88,7 +88,12 @@ def serve_null(endpoint: str, hear: str, say: str, size: int) -> None:
     """Answer everything on a topic with ``size`` bytes on another."""
     session = open_session(Endpoints(connect=endpoint))
     wire, answer = Wire(session, urgent_topics(load_scenario(PAIR))), bytes(size)
-    subscriber = session.declare_subscriber(hear, lambda _: wire.publish(say, answer))
+    wire.publish(say, answer)  # declares the topic, which Zenoh's thread must not do
+
+    def reply(_: zenoh.Sample) -> None:
+        wire.publish(say, answer)
+
+    subscriber = session.declare_subscriber(hear, zenoh.handlers.Callback(reply, indirect=False))
     try:
         threading.Event().wait()
     finally:
@@ -106,7 +111,8 @@ class Lab:
         self.wire = Wire(self.session, urgent_topics(scenario))
         self.answered_ns = 0
         self.answers = threading.Event()
-        self._ear = self.session.declare_subscriber(self.names.cmd_vel, self._on_command)
+        heard = zenoh.handlers.Callback(self._on_command, indirect=False)
+        self._ear = self.session.declare_subscriber(self.names.cmd_vel, heard)
         self._poses, self._at = (Pose(0.0, 0.0, 0.0), Pose(0.0, -0.4, 0.0)), time.time_ns()
 
     def _on_command(self, _: zenoh.Sample) -> None:
@@ -194,7 +200,8 @@ class Ear:
     def __init__(self, endpoint: str) -> None:
         self.heard: list[tuple[int, str, bytes]] = []
         self.session = open_session(Endpoints(connect=endpoint), patience=PATIENCE)
-        self._subscriber = self.session.declare_subscriber("*/command", self._keep)
+        kept = zenoh.handlers.Callback(self._keep, indirect=False)
+        self._subscriber = self.session.declare_subscriber("*/command", kept)
 
     def _keep(self, sample: zenoh.Sample) -> None:
         self.heard.append((time.time_ns(), str(sample.key_expr), sample.payload.to_bytes()))

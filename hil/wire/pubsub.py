@@ -50,13 +50,18 @@ class Wire:
         self._lock = threading.Lock()
 
     def subscribe(self, topics: Iterable[str]) -> None:
-        """Let the payloads of the topics into the inbox. The callback does nothing else: it must be quick."""
+        """Let the payloads of the topics into the inbox.
+
+        Zenoh's own thread puts them there, not one for each topic, so that they lie in the order in which
+        they came, over all topics. The callback must do nothing else: Zenoh itself would wait for it.
+        """
         for topic in topics:
 
             def keep(sample: zenoh.Sample, topic: str = topic) -> None:
                 self.inbox.put(Event(topic, sample.payload.to_bytes()))
 
-            self._subscribers.append(self._session.declare_subscriber(topic, keep))
+            direct = zenoh.handlers.Callback(keep, indirect=False)
+            self._subscribers.append(self._session.declare_subscriber(topic, direct))
 
     def publish(self, topic: str, payload: bytes) -> None:
         """Send a payload; urgent topics go ahead of all others.
