@@ -9,13 +9,13 @@ from typing import Any
 
 from hil import __version__
 from hil.errors import UsageError
+from hil.log.description import RECORD
 from hil.log.older_keys import with_older_keys
 from hil.log.reader import Log
 from hil.log.report_json import as_json
 from hil.scenario.files import build_scenario, scenario_text
 from hil.scenario.schema import Scenario
 
-RECORD = "abreast"
 CERTIFICATE = "abreast.certificate"
 IMPORT = "import"
 """Mode of a log that was made from another recording."""
