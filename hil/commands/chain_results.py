@@ -18,6 +18,7 @@ from hil.judge.replay_verdict import (
     parity_json,
     refuse_other_steps,
     run_data_of_replay,
+    tell_of_feeding,
     violated_bounds,
     why_not_same,
 )
@@ -66,6 +67,8 @@ def replay_run(log: Log, chosen: Scenario, wishes: Wishes) -> None:
     played = replay_chain(log, chosen)
     runs = [run_data_of_replay(log, each, wishes.from_s, wishes.to_s) for each in played]
     summary = summarise_chain(chosen, runs)
+    for pair, each in zip(summary["pairs"], played, strict=True):
+        tell_of_feeding(log, each, pair)
     if wishes.verify:
         summary["parity"] = parity_json(*played)
         for pair, each in zip(summary["pairs"], played, strict=True):

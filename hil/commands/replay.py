@@ -63,7 +63,13 @@ def command(
     --from and --to are seconds since the leader set off, for imported recordings the source's own time; the
     steps always begin where the log does.
     """
-    from hil.judge.replay_verdict import parity_json, run_data_of_replay, violated_bounds, why_not_same
+    from hil.judge.replay_verdict import (
+        parity_json,
+        run_data_of_replay,
+        tell_of_feeding,
+        violated_bounds,
+        why_not_same,
+    )
     from hil.judge.summary import summarise
     from hil.judge.summary_text import print_summary
     from hil.log.reader import read_log
@@ -86,6 +92,7 @@ def command(
         summary["own_motion"] = own_motion
     if verify:
         summary["parity"] = parity_json(played)
+    tell_of_feeding(given, played, summary)
     _write(run_data, summary, table, out)
     print_summary(summary)
     for name, what in (("commands", "commands to the robot"), ("certified", "certified estimates")):
@@ -116,7 +123,8 @@ def _played(
     """Replay of one of our logs, or of another lab's by its topic map."""
     from hil.judge.replay_verdict import refuse_other_steps
     from hil.log.metadata import scenario_of
-    from hil.replay.rerun import replay, replay_foreign, replay_link
+    from hil.replay.feeding import guessed_link, why_guessed
+    from hil.replay.rerun import replay, replay_fed, replay_foreign, replay_link
     from hil.replay.topic_map import load_topic_map
     from hil.scenario.files import with_overrides
     from hil.scenario.links import chain_of, link_of
@@ -128,7 +136,8 @@ def _played(
         return replay_foreign(log, load_topic_map(chart, leader, follower, kind))
     own = scenario_of(log)
     if own is None:
-        return replay(log)
+        link = guessed_link(log, leader, follower, kind)
+        return replay_fed(log, link, why_guessed(link))
     if chain_of(own) is not None and follower is not None:
         _refuse_leader(leader)
         link, was = link_of(with_overrides(own, kind), follower), link_of(own, follower)
