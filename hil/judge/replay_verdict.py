@@ -140,8 +140,8 @@ def _cut_in_front(log: Log) -> str:
     if not missing_s:
         return ""
     return (
-        f"its first {missing_s:.1f} s were cut off, and nobody can repeat what rests on them; verify the log that "
-        "begins with the run"
+        f"its first {missing_s:.1f} s were cut off, and nobody can repeat what rests on them; verify the "
+        "log that begins with the run"
     )
 
 

@@ -60,7 +60,7 @@ def version_of(log: Log) -> str | None:
 
 
 def cut_in_front_s(log: Log) -> float:
-    """Seconds of log time that are missing in front of a log that was longer; 0 where none are known to be."""
+    """Seconds of log time that are missing in front of a log; 0 where none are known to be."""
     begun_ns = log.metadata.get(ORIGIN, {}).get("begun_ns", "")
     if log.start_ns is None or not begun_ns.isdecimal():
         return 0.0
