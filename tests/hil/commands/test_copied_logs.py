@@ -81,6 +81,14 @@ def converted(source: Path, target: Path, *options: str) -> None:
     subprocess.run([command, "--src", source, "--dst", target, *options], check=True, capture_output=True)
 
 
+def test_no_chunk_of_a_run_holds_more_than_a_fifth_of_a_second(run_log: Path) -> None:
+    with run_log.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    spans = [chunk.message_end_time - chunk.message_start_time for chunk in summary.chunk_indexes]
+    assert SECOND_NS / 10 < max(spans) < SECOND_NS / 5
+
+
 def test_a_log_verifies_that_was_a_database_in_between(run_log: Path, capsys: Caught, tmp_path: Path) -> None:
     """It has lost its metadata, and of the times of logging and of sending one."""
     converted(run_log, tmp_path / "between")
