@@ -64,9 +64,10 @@ def command(
     steps always begin where the log does.
     """
     from hil.judge.replay_verdict import (
+        fed_json,
         parity_json,
+        print_fed,
         run_data_of_replay,
-        tell_of_feeding,
         violated_bounds,
         why_not_same,
     )
@@ -92,7 +93,8 @@ def command(
         summary["own_motion"] = own_motion
     if verify:
         summary["parity"] = parity_json(played)
-    tell_of_feeding(given, played, summary)
+    summary |= fed_json(played)
+    print_fed(given, played)
     _write(run_data, summary, table, out)
     print_summary(summary)
     for name, what in (("commands", "commands to the robot"), ("certified", "certified estimates")):

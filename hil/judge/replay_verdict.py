@@ -99,13 +99,17 @@ def parity_json(*played: Replay) -> dict[str, Any]:
     }
 
 
-def tell_of_feeding(log: Log, played: Replay, summary: dict[str, Any]) -> None:
-    """Say on stderr and in a summary why inputs were fed in log order, where they were."""
-    if not played.fed:
-        return
-    summary["fed"] = {"why": played.fed}
-    whose = f" of {played.link.follower}" if played.link.in_chain else ""
-    click.echo(f"log {log.path}: its inputs{whose} are fed in log order: {played.fed}", err=True)
+def fed_json(played: Replay) -> dict[str, Any]:
+    """Part of a summary that says why inputs were fed in log order; empty where they were not."""
+    return {"fed": {"why": played.fed}} if played.fed else {}
+
+
+def print_fed(log: Log, *played: Replay) -> None:
+    """Say on stderr why inputs were fed in log order, a line for every follower for which they were."""
+    for each in played:
+        if each.fed:
+            whose = f" of {each.link.follower}" if each.link.in_chain else ""
+            click.echo(f"log {log.path}: its inputs{whose} are fed in log order: {each.fed}", err=True)
 
 
 def why_not_same(log: Log, played: Replay) -> str:
