@@ -67,7 +67,14 @@ def command(
     --from and --to are seconds since the leader set off, for imported recordings the source's own time; the
     steps always begin where the log does.
     """
-    from hil.judge.replay_verdict import parity_json, run_data_of_replay, violated_bounds, why_not_same
+    from hil.judge.replay_verdict import (
+        fed_json,
+        parity_json,
+        print_fed,
+        run_data_of_replay,
+        violated_bounds,
+        why_not_same,
+    )
     from hil.judge.summary import summarise
     from hil.judge.summary_text import print_summary
     from hil.log.reader import read_log
@@ -90,6 +97,8 @@ def command(
         summary["own_motion"] = own_motion
     if verify:
         summary["parity"] = parity_json(played)
+    summary |= fed_json(played)
+    print_fed(given, played)
     _write(run_data, summary, table, out)
     print_summary(summary)
     for name, what in (("commands", "commands to the robot"), ("certified", "certified estimates")):
@@ -111,7 +120,8 @@ def _with_sources(
     log: Log, estimator: str | None, law: str | None, overrides: tuple[str, ...]
 ) -> tuple[Log, tuple[str, ...]]:
     """Log with its own law and estimator where they are now, and overrides for others than its own."""
-    from hil.log.metadata import RECORD, scenario_of
+    from hil.log.description import RECORD
+    from hil.log.metadata import scenario_of
     from hil.log.own_sources import with_sources
     from hil.scenario.brought import settled_references
 
@@ -138,7 +148,8 @@ def _played(
     """Replay of one of our logs, or of another lab's by its topic map."""
     from hil.judge.replay_verdict import refuse_other_steps
     from hil.log.metadata import scenario_of
-    from hil.replay.rerun import replay, replay_foreign, replay_link
+    from hil.replay.feeding import guessed_link, why_guessed
+    from hil.replay.rerun import replay, replay_fed, replay_foreign, replay_link
     from hil.replay.topic_map import load_topic_map
     from hil.scenario.files import with_overrides
     from hil.scenario.links import chain_of, link_of
@@ -149,7 +160,8 @@ def _played(
         return replay_foreign(log, load_topic_map(chart, leader, follower, overrides))
     own = scenario_of(log)
     if own is None:
-        return replay(log)
+        link = guessed_link(log, leader, follower, overrides)
+        return replay_fed(log, link, why_guessed(link))
     if chain_of(own) is not None and follower is not None:
         _refuse_leader(leader)
         link, was = link_of(with_overrides(own, overrides), follower), link_of(own, follower)
