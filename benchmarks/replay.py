@@ -113,7 +113,7 @@ def compare(log: Path, rounds: int, against: Path | None) -> None:
         for name, (command, checkout) in ways.items():
             found[name].append(took(command, checkout))
     print(
-        f"{log.stat().st_size / 1e6:.1f} MB   {'wall s':>9} {'cpu s':>9} {'peak MB':>9}   as fast as the script"
+        f"log of {log.stat().st_size / 1e6:.1f} MB: seconds, of the processor, peak MB, speed over the script"
     )
     for name, each in found.items():
         middle = Took(*map(median, zip(*each, strict=True)))

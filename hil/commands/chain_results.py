@@ -16,7 +16,9 @@ from hil.judge.chain_text import print_chain
 from hil.judge.replay_verdict import (
     Played,
     evaluated,
+    fed_json,
     parity_json,
+    print_fed,
     refuse_other_steps,
     run_data_of_replay,
     violated_bounds,
@@ -69,6 +71,9 @@ def replay_run(log: Log, chosen: Scenario, wishes: Wishes) -> None:
     played: Sequence[Played] = replay_chain(log, chosen) if kept is None else kept
     runs = [run_data_of_replay(log, each, wishes.from_s, wishes.to_s) for each in played]
     summary = summarise_chain(chosen, runs)
+    for pair, each in zip(summary["pairs"], played, strict=True):
+        pair |= fed_json(each)
+    print_fed(log, *played)
     if wishes.verify:
         summary["parity"] = parity_json(*played)
         for pair, each in zip(summary["pairs"], played, strict=True):

@@ -11,6 +11,7 @@ import numpy as np
 from estimation.time.delay_line import Arrival
 from hil.errors import UsageError
 from hil.judge.frames import Frames, Numbered, frames_of
+from hil.judge.made_by import law_facts
 from hil.judge.side_orders import Order, orders_of
 from hil.judge.sound_messages import is_sound
 from hil.log.metadata import IMPORT, mode_of, recorded_certificate, scenario_of
@@ -59,7 +60,8 @@ class RunData:
     came. ``certified``: estimates with guaranteed radii, where these were asked for. ``certificate``: what
     the log carries for this very scenario, None if it is to be worked out.
     ``orders``: to change sides, as they were given. ``kept``: what a replay in one pass has kept, in the
-    place of estimates, commands, truth and arrivals, which are empty then.
+    place of estimates, commands, truth and arrivals, which are empty then. ``law``: what is to be said of a
+    law of one's own.
 
     A replay is judged on the run data of its log with its own estimates and counts put in by
     :func:`dataclasses.replace`.
@@ -84,6 +86,7 @@ class RunData:
     certificate: Mapping[str, Any] | None = None
     orders: Sequence[Order] = ()
     kept: Kept | None = None
+    law: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,6 +189,7 @@ def run_data_of_link(log: Log, link: Link) -> RunData:
         certified=_decoded(log, records[names.certified], CertifiedEstimate),
         log=_facts(log),
         certificate=None if link.first else certificate_json(certificate_of(scenario, driven=False)),
+        law=law_facts(log, counts.get(link.node_name("controller"), {})),
     )
     return replace(run_data, zero_ns=_zero_ns(log, run_data))
 
@@ -211,6 +215,7 @@ def run_data_of_kept(log: Log, replay: KeptReplay) -> RunData:
         orders=() if link.in_chain else orders_of(link.scenario, [each for each in sides if each]),
         log=_facts(log),
         certificate=None if link.first else certificate_json(certificate_of(link.scenario, driven=False)),
+        law=law_facts(log, kept.reports.get(link.node_name("controller"), {})),
         kept=kept,
     )
     return replace(run_data, zero_ns=_zero_ns(log, run_data))

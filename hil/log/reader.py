@@ -6,7 +6,8 @@ import os
 import struct
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from pathlib import Path
 from typing import BinaryIO
 
@@ -18,11 +19,13 @@ from mcap.stream_reader import StreamReader
 from zstandard import ZstdError
 
 from hil.errors import UsageError
+from hil.log.description import SETTLED_NS, described
 from hil.log.mcap_chunks import MAGIC
 from hil.log.mcap_order import entries_in_order
 from hil.log.mcap_summary import ChunkPlace, read_metadata, read_summary
 from hil.wire.message_types import Message
 from hil.wire.messages import decode, typestore_of
+from hil.wire.topics import LOG
 
 DAMAGE = (
     McapError,
@@ -171,7 +174,7 @@ def read_log(path: Path) -> Log:
             records = list(NonSeekingReader(stream).iter_metadata())
         metadata = {record.name: dict(record.metadata) for record in records}
         ordered = [channels[number] for number in sorted(channels)]
-        return Log(
+        log = Log(
             path=path,
             metadata=metadata,
             topics={channel.topic: _typename(schemas.get(channel.schema_id)) for channel in ordered},
@@ -190,6 +193,17 @@ def read_log(path: Path) -> Log:
             chunks=tuple(summary.chunks) if summary is not None and indexed else (),
             counts=_by_topic(counts, channels),
         )
+    return replace(log, metadata={**_told_in_messages(log), **metadata})
+
+
+def _told_in_messages(log: Log) -> dict[str, dict[str, str]]:
+    """What the log says of itself on a topic; other tools that copy logs leave metadata behind."""
+    said = log.records([LOG]) if LOG in log.topics else iter(())
+    first = next(said, None)
+    if first is None:
+        return {}
+    settled = takewhile(lambda record: record.log_ns < first.log_ns + SETTLED_NS, said)
+    return described(record.payload for record in (first, *settled))
 
 
 def _by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> dict[str, int]:

@@ -120,6 +120,11 @@ class FollowerReplay:
         return [(min(each.next, tally.next), each.logged_ns) for each in done]
 
     @property
+    def lacks(self) -> bool:
+        """Whether the estimator lacks inputs: these may have been edited."""
+        return load(Repeats, self.rows.estimating, 0).missing > 0
+
+    @property
     def lost(self) -> NDArray[np.int64] | None:
         """Digests of inputs that were missing, None for more than are kept."""
         count = self.rows.tally().lost

@@ -41,7 +41,7 @@ class Kept:
 class KeptReplay:
     """A replay of one follower, as :class:`hil.replay.rerun.Replay` is, with rows in the place of messages.
 
-    ``taken``, ``refused``: the estimator's counts.
+    ``taken``, ``refused``: the estimator's counts. ``fed`` is empty, since who is fed is replayed otherwise.
     """
 
     link: Link
@@ -51,6 +51,7 @@ class KeptReplay:
     parity: Mapping[str, Parity] = field(default_factory=dict)
     missing_inputs: int = 0
     restarts: Mapping[str, int] = field(default_factory=dict)
+    fed: str = ""
 
     @property
     def scenario(self) -> Scenario:

@@ -111,7 +111,7 @@ class LogReplay:
 
     def looks_back(self) -> bool:
         """Whether an input that was missing is in the log after all, too far from where it was needed."""
-        if any(follower.lost is None for follower in self.followers):
+        if any(follower.lost is None or follower.lacks for follower in self.followers):
             return True
         lost = np.concatenate([np.asarray(follower.lost) for follower in self.followers])
         if not len(lost):
