@@ -12,6 +12,8 @@ from hil.wire.records import (
     CommandNumbers,
     EstimateNumbers,
     Odometry,
+    ReadCommand,
+    ReadTruth,
     Receipt,
     TruthNumbers,
 )
@@ -83,3 +85,15 @@ def write_command(
 def write_truth(buffer: Buffer, number_at: int, truths: Rows[TruthNumbers]) -> None:
     """Fill :func:`hil.wire.templates.truth_template` from the first row."""
     command_layout.write_truth(buffer, number_at, load(TruthNumbers, borrowed(truths), 0))
+
+
+@entry
+def read_command(payload: bytes, stops: bytes) -> ReadCommand:
+    """Read a decision, unchecked but for its stamps."""
+    return command_layout.read_command(payload, stops)
+
+
+@entry
+def read_truth(payload: bytes) -> ReadTruth:
+    """Read true states, unchecked."""
+    return command_layout.read_truth(payload)

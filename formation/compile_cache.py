@@ -89,24 +89,41 @@ def stamp_of(module: str) -> str:
     return digest.hexdigest()
 
 
-def _path_of(module: str) -> Path | None:
-    path = _ROOT.joinpath(*module.split("."))
-    for found in (path.with_suffix(".py"), path / "__init__.py"):
-        if found.is_file():
+@functools.cache
+def _path_of(module: str) -> str | None:
+    # Plain texts: a stamp asks for hundreds, and a Path takes longer to make than its file to find.
+    path = os.path.join(_ROOT, *module.split("."))
+    for found in (f"{path}.py", os.path.join(path, "__init__.py")):
+        if os.path.isfile(found):
             return found
-    loaded = getattr(sys.modules.get(module), "__file__", None)
-    return Path(loaded) if loaded else None
+    loaded: str | None = getattr(sys.modules.get(module), "__file__", None)
+    return loaded
 
 
 @functools.cache
 def _text_of(module: str) -> str:
     path = _path_of(module)
-    return path.read_text(encoding="utf-8") if path else ""
+    return Path(path).read_text(encoding="utf-8") if path else ""
 
 
 @functools.cache
 def _hash_of(module: str) -> str:
     return hashlib.blake2b(_text_of(module).encode(), digest_size=16).hexdigest()
+
+
+@functools.cache
+def _is_module(package: str, name: str) -> bool:
+    """Whether a package has a module of a name, for one that is imported from it."""
+    return name in _modules_of(package)
+
+
+@functools.cache
+def _modules_of(package: str) -> frozenset[str]:
+    try:
+        names = os.listdir(os.path.join(_ROOT, *package.split(".")))
+    except OSError:
+        return frozenset()
+    return frozenset(name.removesuffix(".py") for name in names if name.endswith(".py"))
 
 
 @functools.cache
@@ -117,9 +134,7 @@ def _imports_of(module: str) -> tuple[str, ...]:
     for source, several, one in _IMPORTS.findall(text):
         found.add(source)
         names = re.findall(r"\w+", several or one)
-        found |= {
-            f"{source}.{name}" for name in names if _ROOT.joinpath(*source.split("."), f"{name}.py").is_file()
-        }
+        found |= {f"{source}.{name}" for name in names if _is_module(source, name)}
     return tuple(sorted(found))
 
 

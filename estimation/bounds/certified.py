@@ -8,13 +8,14 @@ certified radius, whatever filter made it.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from enum import Enum
+from types import ModuleType
 
 import numpy as np
 
-from estimation.bounds.certified_kernels import ACCELERATION, CERTAIN, NOISE, SLOW, intersect
 from formation.angles import FloatArray, wrap
 
 _LONGEST = 1.5
@@ -39,7 +40,12 @@ class Failed(Enum):
     ACCELERATION = "acceleration"
 
 
-_FAILED = {NOISE: Failed.NOISE, SLOW: Failed.SLOW, ACCELERATION: Failed.ACCELERATION}
+@functools.cache
+def load() -> ModuleType:
+    """Load what is compiled, for those who ask for certificates alone; the first need not wait then."""
+    from estimation.bounds import certified_kernels
+
+    return certified_kernels
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,9 +93,11 @@ def certain_motion(
     ranges = np.empty(4)
     slowest, fastest = speeds
     seen = [np.array(values, dtype=np.float64, order="C") for values in (back, moved, blur)]
-    outcome = intersect(seen[0], seen[1], seen[2], A, slowest, fastest, ranges)
-    if outcome != CERTAIN:
-        return _FAILED[outcome]
+    kernels = load()
+    outcome = kernels.intersect(seen[0], seen[1], seen[2], A, slowest, fastest, ranges)
+    if outcome != kernels.CERTAIN:
+        failed = (Failed.NOISE, Failed.SLOW, Failed.ACCELERATION)
+        return failed[(kernels.NOISE, kernels.SLOW, kernels.ACCELERATION).index(outcome)]
     low, high, direction, half = ranges.tolist()
     speed = Interval(0.5 * (low + high), 0.5 * (high - low))
     return CertainMotion(speed, Interval(wrap(direction), half))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib.machinery
-import importlib.metadata
 import importlib.util
 import inspect
 import sys
@@ -93,6 +92,9 @@ def settled(text: str, noun: str, group: str, folder: Path) -> str:
     :class:`UsageError` for a reference without a name behind its colon.
     """
     if not is_reference(text):
+        # A fiftieth of a second, for those who ask for an entry point.
+        import importlib.metadata
+
         points = importlib.metadata.entry_points(group=group, name=text)
         return next((point.value for point in points), text)
     place, _, name = text.rpartition(":")

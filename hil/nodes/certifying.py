@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from estimation.bounds import certified
 from estimation.bounds.certified import Certain, Failed
 from estimation.bounds.certified_positions import PositionCertifier
 from estimation.bounds.certified_sightings import SightingCertifier, SightingErrors, velocity_error
@@ -32,6 +33,7 @@ class Certifying:
     """
 
     def __init__(self, scenario: Scenario) -> None:
+        certified.load()
         leader, step = scenario.leader, 1.0 / scenario.mocap.rate_hz
         A, speeds = float(leader_acceleration(leader.k_v, leader.k_u)), (leader.v_eps, leader.k_v)
         self.by_frames = PositionCertifier(position_bound(scenario), A, speeds, step)

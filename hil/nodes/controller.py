@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+from types import ModuleType
+
 from controllers.follower import Command
 from controllers.station_keeper import StationState, at_station
 from estimation.tracking.prediction import SentCommand, Sight, rows_for
@@ -23,7 +26,6 @@ from hil.nodes.controller_desk import (
     NodeRules,
     Notes,
 )
-from hil.nodes.controller_entries import control, hear, hear_estimate, refuse
 from hil.nodes.controller_events import NOTHING, STOP, TICK, ControlEvent, Happening, happened
 from hil.nodes.controller_step import ControlState, begun
 from hil.nodes.counting import Count, counts_in
@@ -151,8 +153,20 @@ class ControllerNode:
         self.subscribes: tuple[str, ...] = (self.topics.estimate, topics.STOP, *leader, *orders)
         self._drive_type = drive_type(stamped=stamped)
 
+    @functools.cached_property
+    def _entries(self) -> ModuleType:
+        """The steps, loaded once somebody takes one: a replay in one pass has entries of its own."""
+        from hil.nodes import controller_entries
+
+        return controller_entries
+
     def begin(self, now_ns: int) -> ControllerState:
         """State of a controller that has heard nothing: it keeps the robot still."""
+        _ = self._entries
+        return self.rows_only(now_ns)
+
+    def rows_only(self, now_ns: int) -> ControllerState:
+        """The same for who steps it by entries of his own."""
         desk = Desk(
             rules=self.rules,
             control=row_of(begun(at_station(self.station), now_ns)),
@@ -175,17 +189,17 @@ class ControllerNode:
         self, state: ControllerState, event: Event, now_ns: int
     ) -> tuple[ControllerState, tuple[Outgoing, ...]]:
         """Take in an estimate, a stop or a tick; each leads to a command."""
-        topic = event.topic
+        topic, entries = event.topic, self._entries
         if topic == self._estimate:
             whole = in_little_endian(event.payload, _ESTIMATE)
-            if not hear_estimate(state.lent, whole, event.signed_digest, now_ns):
-                refuse(state.lent, MALFORMED)
+            if not entries.hear_estimate(state.lent, whole, event.signed_digest, now_ns):
+                entries.refuse(state.lent, MALFORMED)
         elif topic:
-            hear(state.lent, event.signed_digest, now_ns)
+            entries.hear(state.lent, event.signed_digest, now_ns)
             store(state.desk.event, 0, self._read(state, event))
         else:
             store(state.desk.event, 0, TICK)
-        length = control(state.lent, _STOPS, now_ns)
+        length = entries.control(state.lent, _STOPS, now_ns)
         if not length:
             return state, ()
         decided, driven = state.desk.decision[:length].tobytes(), state.desk.drive.tobytes()
@@ -207,9 +221,9 @@ class ControllerNode:
                 word = decode_as(event.payload, msg.String).data
                 return happened(Happening.ORDER, Side(word).sign)
         except MalformedPayloadError:
-            refuse(state.lent, MALFORMED)
+            self._entries.refuse(state.lent, MALFORMED)
         except ValueError:
-            refuse(state.lent, UNKNOWN_SIDE)
+            self._entries.refuse(state.lent, UNKNOWN_SIDE)
         return NOTHING
 
     def report(self, state: ControllerState, now_ns: int) -> Outgoing:

@@ -114,6 +114,12 @@ class EstimatorNode:
 
     def begin(self, now_ns: int) -> EstimatorState:
         """State of an estimator that has seen nothing."""
+        state = self.rows_only(now_ns)
+        state.memory.load()
+        return state
+
+    def rows_only(self, now_ns: int) -> EstimatorState:
+        """The same for who steps it by entries of his own."""
         memory = EstimatorMemory(self.rules, self._reader, self._wanted, self._template)
         return EstimatorState(memory, next_tick_ns=now_ns, next_diagnostics_ns=now_ns)
 

@@ -6,7 +6,8 @@ compiled goes through the very same functions in plain Python, with a list in th
 
 from __future__ import annotations
 
-from typing import cast
+import functools
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,6 @@ from hil.nodes.estimator_desk import (
     SensorRules,
     TimedFrame,
 )
-from hil.nodes.estimator_entries import COMPILED, PLAIN
 from hil.nodes.estimator_step import FUSED, MOCAP, ODOMETRY, Known, Rules, Told, estimate
 from hil.nodes.frame_time import time_rules
 from hil.nodes.node import Counts
@@ -50,6 +50,9 @@ from hil.wire.reading import FrameReader
 from hil.wire.records import Receipt, Sighting, Wanted
 from hil.wire.templates import Template
 from hil.wire.writing import MOST_RECEIPTS
+
+if TYPE_CHECKING:
+    from hil.nodes.estimator_entries import Steps
 
 HISTORY = 2.0
 """Seconds of odometry kept, enough for the latest frame that the ring can take."""
@@ -138,9 +141,19 @@ class EstimatorMemory:
             bodies=reader.bodies,
             wanted=wanted,
         )
-        self._steps = COMPILED if self._compiled else PLAIN
         self._lent = lent(self.desk) if self._compiled else cast("Rows[Desk]", [self.desk])
         self._capture_ns = columns_of(self.desk.newest)["capture_ns"]
+
+    @functools.cached_property
+    def _steps(self) -> Steps:
+        """The steps, loaded once somebody takes one: a replay in one pass has entries of its own."""
+        from hil.nodes.estimator_entries import COMPILED, PLAIN
+
+        return COMPILED if self._compiled else PLAIN
+
+    def load(self) -> None:
+        """Load the steps, so that the first one need not wait for that."""
+        _ = self._steps
 
     def copy(self) -> EstimatorMemory:
         """The same memory, to go on from twice."""

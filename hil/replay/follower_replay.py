@@ -147,9 +147,9 @@ class FollowerReplay:
         done = load(Repeats, rows, 0)
         store(rows, 0, done._replace(begun=True))
         if part is ESTIMATES:
-            self.nodes.estimating = self.nodes.estimator.begin(done.begin_ns)
+            self.nodes.estimating = self.nodes.estimator.rows_only(done.begin_ns)
         else:
-            self.nodes.deciding = self.nodes.controller.begin(done.begin_ns)
+            self.nodes.deciding = self.nodes.controller.rows_only(done.begin_ns)
 
     def trial(self, part: Part) -> Trial | None:
         """Go back to before the last output, for a node that begins there; None for the very first."""

@@ -41,7 +41,7 @@ def kept_replays(log: Log, links: Sequence[tuple[Link, Link]]) -> tuple[KeptRepl
     more than one message at a time, and logs in which something is not as live nodes leave it, an order that
     is off by seconds, say. Raises :class:`UsageError` for a damaged log.
     """
-    if not compiles() or not all(_can_be_kept(log, chosen) for chosen, _ in links):
+    if not compiles() or not all(_may_be_kept(log, chosen) for chosen, _ in links):
         return None
     try:
         replay = LogReplay(log, links)
@@ -51,13 +51,11 @@ def kept_replays(log: Log, links: Sequence[tuple[Link, Link]]) -> tuple[KeptRepl
         return None
 
 
-def _can_be_kept(log: Log, link: Link) -> bool:
+def _may_be_kept(log: Log, link: Link) -> bool:
     given, estimate = link.scenario.estimator, link_topics(link).estimate
     if given.kind == "smoother" or given.certify or given.align_odometry:
         return False
-    if log.topics.get(estimate) != typename_of(LeaderEstimate) or not log.counts.get(estimate):
-        return False
-    return isinstance(estimator_node(link).rules.step.filter, Filter)
+    return log.topics.get(estimate) == typename_of(LeaderEstimate) and bool(log.counts.get(estimate))
 
 
 class LogReplay:
@@ -66,6 +64,8 @@ class LogReplay:
     def __init__(self, log: Log, links: Sequence[tuple[Link, Link]]) -> None:
         self.log = log
         nodes = [(estimator_node(chosen), controller_node(chosen)) for chosen, _ in links]
+        if not all(isinstance(estimator.rules.step.filter, Filter) for estimator, _ in nodes):
+            raise OddLogError
         hashed: set[str] = set()
         others: set[str] = {topics.DIAGNOSTICS, topics.STOP}
         self._sides: set[str] = set()

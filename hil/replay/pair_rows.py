@@ -65,7 +65,7 @@ class Nodes:
     @staticmethod
     def begun(estimator: EstimatorNode, controller: ControllerNode) -> Nodes:
         """Nodes that have not done anything."""
-        return Nodes(estimator, controller, estimator.begin(0), controller.begin(0))
+        return Nodes(estimator, controller, estimator.rows_only(0), controller.rows_only(0))
 
 
 class PairRows:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from formation.pose import Motion
-from hil.wire import entries
 from hil.wire import message_types as msg
 from hil.wire.messages import MalformedPayloadError, header, in_little_endian, typename_of
 
@@ -26,6 +25,9 @@ def read_drive(payload: bytes, *, stamped: bool) -> Motion:
 
     Raises :class:`~hil.wire.messages.MalformedPayloadError` for a payload that is none.
     """
+    # Compiled code, loaded where somebody reads: writing needs none of it.
+    from hil.wire import entries
+
     kind = drive_type(stamped=stamped)
     drive = entries.read_drive(in_little_endian(payload, kind), stamped)
     if not drive.sound:

@@ -9,7 +9,6 @@ from controllers.guard import CLOCK_TOLERANCE_NS
 from estimation.own_motion.odometry_history import MotionSample
 from formation.records import Rows, row_of, rows_of
 from hil.errors import AbreastError
-from hil.wire import entries
 from hil.wire import message_types as msg
 from hil.wire.cdr import packed_texts
 from hil.wire.message_checks import ANY_TIME_NS, Cause
@@ -51,6 +50,9 @@ class FrameReader:
 
     def read(self, payload: bytes, wanted: Rows[Wanted]) -> Frame:
         """The frame as a pair sees it; its cause tells whether it is used."""
+        # Compiled code, loaded where somebody reads by Python: the steps of nodes need none of it.
+        from hil.wire import entries
+
         if self.again(payload):
             return entries.look_again(self.heads, self.bodies, wanted)
         whole = in_little_endian(payload, msg.RigidBodies.__msgtype__)
@@ -85,6 +87,8 @@ def read_odometry(payload: bytes, now_ns: int) -> MotionSample:
 
     Raises :class:`RefusedError` by cause: malformed, bad_stamp, not_finite, out_of_range.
     """
+    from hil.wire import entries
+
     whole = in_little_endian(payload, msg.Odometry.__msgtype__)
     motion = entries.take_odometry(whole, now_ns + CLOCK_TOLERANCE_NS)
     _refuse(motion.cause)
@@ -97,6 +101,8 @@ def read_sighting(payload: bytes, now_ns: int) -> Sighting:
     Raises :class:`RefusedError` by cause: malformed, bad_stamp, not_finite, out_of_range, bad_range (not
     above zero).
     """
+    from hil.wire import entries
+
     whole = in_little_endian(payload, msg.RangeBearing.__msgtype__)
     sighting = entries.take_sighting(whole, now_ns + CLOCK_TOLERANCE_NS)
     _refuse(sighting.cause)

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from estimation.tracking.estimate import Estimate
 from formation.pose import Motion
 from formation.records import Rows, columns_of, row_of, rows_of
-from hil.wire import entries
 from hil.wire.assumed_errors import AssumedErrors
 from hil.wire.cdr import packed_texts
 from hil.wire.drive_message import drive_type
@@ -37,13 +36,16 @@ class DriveWriter:
     """Writes drive commands, stamped or not, for the robot whose frame this is."""
 
     def __init__(self, frame_id: str, *, stamped: bool) -> None:
+        from hil.wire import entries
+
+        self._write = entries.write_drive
         self._template = drive_template(frame_id, stamped=stamped)
         self.typename = drive_type(stamped=stamped)
 
     def write(self, motion: Motion, stamp_ns: int) -> bytes:
         """Bytes of a command."""
         buffer, twist_at = self._template
-        entries.write_drive(buffer, twist_at, stamp_ns, motion.v, motion.u)
+        self._write(buffer, twist_at, stamp_ns, motion.v, motion.u)
         return buffer.tobytes()
 
 
@@ -54,6 +56,9 @@ class EstimateWriter:
     """
 
     def __init__(self, frame_id: str, assumed: AssumedErrors, reasons: Sequence[str]) -> None:
+        from hil.wire import entries
+
+        self._write = entries.write_estimate
         self._template = estimate_template(frame_id, MOST_RECEIPTS)
         self._assumed = row_of(assumed)
         self._reasons = packed_texts(reasons)
@@ -65,7 +70,7 @@ class EstimateWriter:
         """Bytes of the estimate in a row, made at a time."""
         buffer, times_at = self._template
         consumed = self._receipts.fill(receipts)
-        length = entries.write_estimate(
+        length = self._write(
             buffer,
             times_at,
             self._reasons,

@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from msgspec import structs
 
 from estimation.tracking.tracker import Status
 from hil.judge.run_data import RunData, run_data_of_log
-from hil.judge.summary import summarise
+from hil.judge.summary import percentile, summarise
 from hil.log.metadata import recorded_certificate
 from hil.log.reader import Log
 from hil.log.report_json import as_json
@@ -237,3 +239,8 @@ def test_a_recorded_leader_is_certified_by_its_limits_alone(exact_run_data: RunD
     found = summarise(without_truth(exact_run_data))["certificate"]
     assert "v1 anywhere between 0.04 and 0.1 m/s" in found["formation"]["assumes"]
     assert "constant speed" in found["k_u_star"]["why"]
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=40), st.sampled_from([0.0, 50.0, 99.0, 100.0]))
+def test_percentiles_are_those_of_numpy_to_the_bit(values: list[float], q: float) -> None:
+    assert percentile(np.array(values), q) == np.percentile(values, q)

@@ -79,6 +79,18 @@ estimates = st.builds(
     *[floats] * 3,
     st.lists(st.builds(msg.Consumed, st.integers(0, 2**64 - 1), times), max_size=3),
 )
+commands = st.builds(
+    msg.Command,
+    headers,
+    times,
+    times,
+    *[floats] * 4,
+    st.booleans(),
+    texts,
+    st.booleans(),
+    st.lists(st.builds(msg.Consumed, st.integers(0, 2**64 - 1), times), max_size=3),
+)
+truths = st.builds(msg.Truth, headers, st.integers(0, 2**32 - 1), *[floats] * 10)
 placements = st.builds(Placement, *[floats] * 7)
 receipts = st.lists(st.builds(Receipt, st.integers(-(2**63), 2**63 - 1), moments), max_size=3)
 
@@ -226,6 +238,39 @@ def test_estimates_are_read_as_the_general_codec_reads_them(payload: bytes) -> N
     assert stamps == [(each.received.sec, each.received.nanosec) for each in m.consumed]
     assert load(EstimateNumbers, rows, 0)[:6] == numbers[:6]
     assert covariance.tobytes() == m.covariance.tobytes()
+
+
+@given(st.one_of(payloads(commands), st.binary(max_size=80)), texts)
+@settings(deadline=None, max_examples=200)
+def test_decisions_are_read_as_the_general_codec_reads_them(payload: bytes, other: str) -> None:
+    whole, message = in_little_endian(payload, msg.Command.__msgtype__), decoded(payload, msg.Command)
+    stop = "" if message is None else message.stop
+    read = both(layouts.read_command, whole, packed_texts([other, stop]))
+    if message is None or not all(map(is_clock, (message.header.stamp, message.capture, message.measured))):
+        assert not read.sound
+        return
+    assert read.sound
+    n, m = read.numbers, message
+    assert n[:3] == tuple(map(to_ns, (m.header.stamp, m.capture, m.measured)))
+    assert n.stop == (0 if other == stop else 1)
+    assert raw(n.v2, n.u2, n.v2_wanted, n.u2_wanted) == raw(m.v2, m.u2, m.v2_wanted, m.u2_wanted)
+    assert (n.saturated, n.fresh) == (bool(m.saturated), bool(m.fresh))
+    ends = [struct.unpack_from("<QiI", whole, read.receipts_at + 16 * k) for k in range(n.consumed)]
+    assert ends == [(each.digest, each.received.sec, each.received.nanosec) for each in m.consumed]
+
+
+@given(st.one_of(payloads(truths), st.binary(max_size=120)))
+@settings(deadline=None, max_examples=200)
+def test_true_states_are_read_as_the_general_codec_reads_them(payload: bytes) -> None:
+    message = decoded(payload, msg.Truth)
+    read = both(layouts.read_truth, in_little_endian(payload, msg.Truth.__msgtype__))
+    assert read.sound == (message is not None)
+    if message is None:
+        return
+    assert read.stamp == (message.header.stamp.sec, message.header.stamp.nanosec)
+    assert read.numbers.frame_number == message.frame_number
+    states = [getattr(message, name) for name in TruthNumbers._fields[2:]]
+    assert raw(*read.numbers[2:]) == raw(*states)
 
 
 def stamp(ns: int) -> msg.Time:
