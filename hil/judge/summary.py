@@ -85,7 +85,7 @@ def _latency(columns: Columns) -> dict[str, dict[str, float]]:
     first = commands.fresh & _in_run(columns)
     if not np.any(first):
         return {}
-    waits_ms = (commands.issued_ns - commands.capture_ns)[first] * 1e-6
+    waits_ms: FloatArray = np.asarray((commands.issued_ns - commands.capture_ns)[first] * 1e-6)
     return {"capture_to_command": {name: percentile(waits_ms, q) for name, q in PERCENTILES.items()}}
 
 
