@@ -1,0 +1,73 @@
+"""Estimate a leader's motion, keep abreast of it, and judge how well that went: all of it from Python.
+
+Arrays in and out, in SI units and radians. Nothing here looks at a clock or opens a socket unless it is asked
+to, and nothing is loaded before it is used.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from typing import TYPE_CHECKING, Any
+
+from abreast._hidden import refuse_hidden
+
+if TYPE_CHECKING:
+    from abreast._estimates import Estimates
+    from abreast._estimation import estimate
+    from abreast._lockstep import run_lockstep
+    from abreast._runs import Run
+    from abreast._scenarios import load_scenario, scenarios
+    from formation.pose import Motion
+    from hil import __version__
+    from hil.errors import CheckFailedError, UsageError
+    from hil.scenario.schema import Scenario
+
+__all__ = [
+    "CheckFailedError",
+    "Estimates",
+    "Motion",
+    "Run",
+    "Scenario",
+    "UsageError",
+    "__version__",
+    "estimate",
+    "load_scenario",
+    "run_lockstep",
+    "scenarios",
+]
+
+_HOMES = {
+    "CheckFailedError": "hil.errors",
+    "Estimates": "abreast._estimates",
+    "Motion": "formation.pose",
+    "Run": "abreast._runs",
+    "Scenario": "hil.scenario.schema",
+    "UsageError": "hil.errors",
+    "__version__": "hil",
+    "estimate": "abreast._estimation",
+    "load_scenario": "abreast._scenarios",
+    "run_lockstep": "abreast._lockstep",
+    "scenarios": "abreast._scenarios",
+}
+"""Where each name is defined."""
+
+_OF_COMMAND = ("-m", "abreast")
+"""First argument while ``python -m`` looks for its module, and the console script's name: these tell what is
+hidden by themselves, in one line."""
+
+if sys.argv[:1] and sys.argv[0].rpartition("/")[2] not in _OF_COMMAND:
+    refuse_hidden()
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    refuse_hidden()
+    found = getattr(importlib.import_module(_HOMES[name]), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
