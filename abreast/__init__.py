@@ -13,42 +13,75 @@ from typing import TYPE_CHECKING, Any
 from abreast._hidden import refuse_hidden
 
 if TYPE_CHECKING:
+    from abreast._analyses import SweepResult, bounds, calibrate, gains, simulate, sweep
     from abreast._estimates import Estimates
     from abreast._estimation import estimate
     from abreast._lockstep import run_lockstep
+    from abreast._logs import read_log, replay
     from abreast._runs import Run
     from abreast._scenarios import load_scenario, scenarios
+    from estimation.bounds.certificate import Certificate
     from formation.pose import Motion
     from hil import __version__
     from hil.errors import CheckFailedError, UsageError
+    from hil.log.reader import Log
+    from hil.replay.lab_calibration import Calibration
     from hil.scenario.schema import Scenario
+    from hil.simulate.gain_proposal import GainProposal
+    from hil.simulate.simulation import Simulation
 
 __all__ = [
+    "Calibration",
+    "Certificate",
     "CheckFailedError",
     "Estimates",
+    "GainProposal",
+    "Log",
     "Motion",
     "Run",
     "Scenario",
+    "Simulation",
+    "SweepResult",
     "UsageError",
     "__version__",
+    "bounds",
+    "calibrate",
     "estimate",
+    "gains",
     "load_scenario",
+    "read_log",
+    "replay",
     "run_lockstep",
     "scenarios",
+    "simulate",
+    "sweep",
 ]
 
 _HOMES = {
+    "Calibration": "hil.replay.lab_calibration",
+    "Certificate": "estimation.bounds.certificate",
     "CheckFailedError": "hil.errors",
     "Estimates": "abreast._estimates",
+    "GainProposal": "hil.simulate.gain_proposal",
+    "Log": "hil.log.reader",
     "Motion": "formation.pose",
     "Run": "abreast._runs",
     "Scenario": "hil.scenario.schema",
+    "Simulation": "hil.simulate.simulation",
+    "SweepResult": "abreast._analyses",
     "UsageError": "hil.errors",
     "__version__": "hil",
+    "bounds": "abreast._analyses",
+    "calibrate": "abreast._analyses",
     "estimate": "abreast._estimation",
+    "gains": "abreast._analyses",
     "load_scenario": "abreast._scenarios",
+    "read_log": "abreast._logs",
+    "replay": "abreast._logs",
     "run_lockstep": "abreast._lockstep",
     "scenarios": "abreast._scenarios",
+    "simulate": "abreast._analyses",
+    "sweep": "abreast._analyses",
 }
 """Where each name is defined."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -89,7 +89,7 @@ class Run:
         return dict(self.summary)
 
 
-def run_of(summary: Mapping[str, Any], runs: list[RunData]) -> Run:
+def run_of(summary: Mapping[str, Any], runs: Sequence[RunData]) -> Run:
     """Run with a summary, of the data of its pair or of all pairs of its chain."""
     pairs = summary.get("pairs")
     if pairs is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import msgspec
@@ -43,16 +43,17 @@ def load_scenario(name_or_path: str, overrides: Overrides = ()) -> Scenario:
     return build_scenario(tree, overrides, source=f"scenario {path.stem}")
 
 
-def build_scenario(tree: Mapping[str, Any], overrides: Overrides = (), source: str = "scenario") -> Scenario:
+def build_scenario(tree: Mapping[str, Any], *overrides: Overrides, source: str = "scenario") -> Scenario:
     """Check a tree of plain values (as TOML gives) and turn it into a :class:`Scenario`."""
     merged = msgspec.to_builtins(tree)
-    if isinstance(overrides, Mapping):
-        for key, value in overrides.items():
-            node, last = _place(merged, key, f"override {key!r}")
-            node.update(_overlaid(node, {last: _plain(value)}))
-    else:
-        for override in overrides:
-            _apply(merged, override)
+    for some in overrides:
+        if isinstance(some, Mapping):
+            for key, value in some.items():
+                node, last = _place(merged, key, f"override {key!r}")
+                node.update(_overlaid(node, {last: _plain(value)}))
+        else:
+            for override in some:
+                _apply(merged, override)
     return checked(merged, Scenario, source)
 
 
@@ -109,9 +110,9 @@ def scenario_text(scenario: Scenario) -> str:
     return tomli_w.dumps(msgspec.to_builtins(scenario))
 
 
-def with_overrides(scenario: Scenario, overrides: Overrides) -> Scenario:
-    """Return the scenario with ``section.key=value`` overrides applied and checked."""
-    return build_scenario(msgspec.to_builtins(scenario), overrides, source=f"scenario {scenario.name}")
+def with_overrides(scenario: Scenario, *overrides: Overrides) -> Scenario:
+    """Return the scenario with ``section.key=value`` overrides applied, in their order, and checked."""
+    return build_scenario(msgspec.to_builtins(scenario), *overrides, source=f"scenario {scenario.name}")
 
 
 def _overlaid(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
@@ -136,6 +137,25 @@ def _apply(tree: dict[str, Any], override: str) -> None:
         value = text.strip()
     node, last = _place(tree, key, f"--set {override!r}")
     node[last] = value
+
+
+def override_texts(overrides: Overrides) -> tuple[str, ...]:
+    """Overrides as the texts ``section.key=value`` that ``--set`` takes."""
+    if not isinstance(overrides, Mapping):
+        return tuple(overrides)
+    return tuple(f"{key}={_toml(value)}" for key, value in _leaves(_plain(overrides)))
+
+
+def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _toml(value: Any) -> str:
+    return tomli_w.dumps({"value": value}).partition("=")[2].strip()
 
 
 def _place(tree: dict[str, Any], key: str, source: str) -> tuple[dict[str, Any], str]:
