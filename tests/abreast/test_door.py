@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -120,3 +121,15 @@ def test_arrays_of_results_are_numpy_s() -> None:
     assert all(
         isinstance(column, np.ndarray) and column.shape == (10,) for column in found.as_dict().values()
     )
+
+
+def test_the_docs_list_every_name() -> None:
+    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    assert set(abreast.__all__) == set(re.findall(r"`(\w+)(?:\([^`]*\))?`", text)) & set(dir(abreast))
+
+
+def test_the_example_of_the_readme_runs(tmp_path: Path) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    result = python("-c", f"{code}\nprint(f'{{found.v1[-1]:.2f}}', run.summary['seed'])", folder=tmp_path)
+    assert (result.returncode, result.stdout) == (0, "0.10 7\n"), result.stderr
