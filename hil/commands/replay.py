@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 @click.command("replay")
 @click.argument("log", type=click.Path(path_type=Path))
 @click.option("--verify", is_flag=True, help="Compare with what was recorded, bit for bit.")
-@click.option("--estimator", metavar="E", help="Estimator in place of the log's, such as ukf or smoother.")
+@click.option(
+    "--estimator", metavar="E", help="Estimator in place of the log's: ukf, smoother, file.py:factory."
+)
+@click.option("--law", metavar="L", help="Where the log's own law is now, or another one to judge by.")
 @click.option("--leader", metavar="NAME", help="Name of the leader's body.")
 @click.option("--follower", metavar="NAME", help="Name of the follower's body.")
 @click.option("--map", "chart", metavar="FILE", help="Names the topics of a log that is not abreast's.")
@@ -42,6 +45,7 @@ def command(
     log: Path,
     verify: bool,
     estimator: str | None,
+    law: str | None,
     leader: str | None,
     follower: str | None,
     chart: str | None,
@@ -67,6 +71,7 @@ def command(
     given = read_log(log)
     choice = ReplayChoice(
         estimator=estimator,
+        law=law,
         leader=leader,
         follower=follower,
         chart=chart,

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION
 from hil.log.report_json import print_json
 from hil.scenario.files import load_scenario
@@ -14,7 +15,7 @@ from hil.scenario.files import load_scenario
 
 @click.command("simulate")
 @click.argument("scenario", default="turtlebot3")
-@click.option("--law", help="Law in place of the scenario's.")
+@click.option("--law", help="Law in place of the scenario's, file.py:function too.")
 @click.option("--duration", type=DURATION, help="Seconds to simulate.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for pictures and CSV.")
 @click.option("--stability", is_flag=True, help="Check the propositions of the paper, too; a pair only.")
@@ -40,7 +41,9 @@ def command(
         chosen.append(f"controller.law={law}")
     if duration is not None:
         chosen.append(f"run.duration_s={duration}")
-    result = experiment(load_scenario(scenario, chosen), out, stability=stability).as_dict()
+    loaded = load_scenario(scenario, chosen)
+    load_own_parts(loaded, estimates=False)
+    result = experiment(loaded, out, stability=stability).as_dict()
     if as_json:
         print_json(result)
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,28 +11,33 @@ from hil.judge.chain_summary import summarise_chain
 from hil.judge.replay_verdict import parity_json, refuse_other_steps, run_data_of_replay, why_not_same
 from hil.judge.run_data import RunData
 from hil.judge.summary import summarise
-from hil.log.metadata import scenario_of
+from hil.log.metadata import RECORD, scenario_of
+from hil.log.own_sources import with_sources
 from hil.log.reader import Log
 from hil.replay.odometry_alignment import judge_own_motion
 from hil.replay.rerun import Replay, replay, replay_chain, replay_foreign, replay_link
 from hil.replay.topic_map import load_topic_map
+from hil.scenario.brought import settled_references
 from hil.scenario.certify import CERTIFY, same_steps
 from hil.scenario.files import Overrides, with_overrides
 from hil.scenario.links import chain_of, link_of
 from hil.scenario.schema import Scenario
+
+_KEYS = {"law": "controller.law", "estimator": "estimator.kind"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayChoice:
     """What a log is replayed by, and what is judged.
 
-    ``estimator``: in place of the log's. ``leader``, ``follower``: names of bodies; in a chain ``follower``
-    is the one to look at, and without it all are. ``chart``: topic map of a log that is not ours. ``from_s``,
+    ``estimator``, ``law``: in place of the log's, or where its own are now. ``leader``, ``follower``: names
+    of bodies; in a chain ``follower`` is the one to look at, and without it all are. ``chart``: topic map of a log that is not ours. ``from_s``,
     ``to_s`` [s] limit what is judged. ``verify``: whether outputs are compared with the recorded ones.
     ``certify``: whether certified estimates are made.
     """
 
     estimator: str | None = None
+    law: str | None = None
     leader: str | None = None
     follower: str | None = None
     chart: str | None = None
@@ -40,12 +46,6 @@ class ReplayChoice:
     to_s: float | None = None
     verify: bool = False
     certify: bool = False
-
-    @property
-    def changes(self) -> tuple[Overrides, ...]:
-        """All that is to be different in the scenario, in its order."""
-        kind = {} if self.estimator is None else {"estimator.kind": self.estimator}
-        return self.overrides, kind, [CERTIFY] if self.certify else []
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,9 +78,10 @@ def replayed(log: Log, choice: ReplayChoice) -> Replayed:
     """
     if choice.from_s is not None and choice.to_s is not None and choice.to_s <= choice.from_s:
         raise UsageError(f"--to {choice.to_s:g}: expected more than --from {choice.from_s:g}")
+    log, changes = _with_sources(log, choice)
     if (chain := chain_in(log, choice)) is not None:
-        return _replayed_chain(log, chain, choice)
-    played = _played(log, choice)
+        return _replayed_chain(log, chain, choice, changes)
+    played = _played(log, choice, changes)
     run_data = run_data_of_replay(log, played, choice.from_s, choice.to_s)
     summary = summarise(run_data)
     if choice.chart is None and (own_motion := judge_own_motion(log, played.scenario)):
@@ -90,9 +91,21 @@ def replayed(log: Log, choice: ReplayChoice) -> Replayed:
     return Replayed(summary, (run_data,), (played,), played.scenario)
 
 
-def _replayed_chain(log: Log, own: Scenario, choice: ReplayChoice) -> Replayed:
+def _with_sources(log: Log, choice: ReplayChoice) -> tuple[Log, tuple[Overrides, ...]]:
+    """Log with its own law and estimator where they are now, and all that is to be different, in order."""
+    chosen = settled_references(choice.law, choice.estimator)
+    placed = with_sources(log, chosen, RECORD)
+    own = scenario_of(placed)
+    kept = {} if own is None else {"law": own.controller.law, "estimator": own.estimator.kind}
+    others = {
+        _KEYS[noun]: text for noun, text in chosen.items() if text is not None and text != kept.get(noun)
+    }
+    return placed, (choice.overrides, others, [CERTIFY] if choice.certify else [])
+
+
+def _replayed_chain(log: Log, own: Scenario, choice: ReplayChoice, changes: Sequence[Overrides]) -> Replayed:
     _refuse_leader(choice.leader)
-    chosen = with_overrides(own, *choice.changes)
+    chosen = with_overrides(own, *changes)
     if choice.verify:
         refuse_other_steps(chosen, own)
     played = replay_chain(log, chosen)
@@ -105,26 +118,26 @@ def _replayed_chain(log: Log, own: Scenario, choice: ReplayChoice) -> Replayed:
     return Replayed(summary, runs, played, chosen)
 
 
-def _played(log: Log, choice: ReplayChoice) -> Replay:
+def _played(log: Log, choice: ReplayChoice, changes: Sequence[Overrides]) -> Replay:
     """Replay of one of our logs, or of another lab's by its topic map."""
     if choice.chart is not None:
         if choice.verify:
             raise UsageError("--verify: a log that needs --map has no estimates of ours; leave one out")
-        chart = load_topic_map(choice.chart, choice.leader, choice.follower, *choice.changes)
+        chart = load_topic_map(choice.chart, choice.leader, choice.follower, *changes)
         return replay_foreign(log, chart)
     own = scenario_of(log)
     if own is None:
         return replay(log)
     if chain_of(own) is not None and choice.follower is not None:
         _refuse_leader(choice.leader)
-        link = link_of(with_overrides(own, *choice.changes), choice.follower)
+        link = link_of(with_overrides(own, *changes), choice.follower)
         was = link_of(own, choice.follower)
         if choice.verify:
             refuse_other_steps(link.scenario, was.scenario)
         return replay_link(log, link, was)
     names = {"leader.name": choice.leader, "follower.name": choice.follower}
     renamed = {key: name for key, name in names.items() if name is not None}
-    chosen = with_overrides(own, *choice.changes, renamed)
+    chosen = with_overrides(own, *changes, renamed)
     if choice.verify and not same_steps(chosen, own):
         raise UsageError(
             f"--verify compares with what was recorded: by {own.estimator.kind}, of leader "
