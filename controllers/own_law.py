@@ -11,6 +11,7 @@ in several processes, asks it anew.
 from __future__ import annotations
 
 import copy
+import keyword
 import math
 from collections import namedtuple
 from collections.abc import Callable, Mapping
@@ -90,7 +91,7 @@ class OwnLaw:
     ) -> None:
         given = dict(parameters or {})
         for parameter in given:
-            if parameter in GIVEN or not parameter.isidentifier() or parameter.startswith("_"):
+            if parameter in GIVEN or not is_name(parameter):
                 raise ValueError(
                     f"parameter {parameter!r} of law {name}: expected a name of its own, such as k; "
                     f"taken are {', '.join(GIVEN)}"
@@ -122,6 +123,11 @@ class OwnLaw:
     def failure(self) -> str:
         """What went wrong the last time, empty if nothing ever did."""
         return self._called.failure()
+
+
+def is_name(text: str) -> bool:
+    """Whether a parameter may be called so."""
+    return text.isidentifier() and not keyword.iskeyword(text) and not text.startswith("_")
 
 
 def gains_type(parameters: tuple[str, ...]) -> type[Any]:

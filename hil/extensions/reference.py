@@ -130,7 +130,7 @@ def loaded(reference: Found) -> Any:
     noun = reference.noun
     try:
         module = _module_of(reference)
-    except Exception as error:  # whatever somebody's file may raise
+    except (Exception, SystemExit) as error:  # whatever somebody's file may raise
         what = f"{type(error).__name__}: {error}".splitlines()[0]
         raise UsageError(f"{noun} {reference.text}: cannot be loaded ({what}); correct the file") from None
     thing = getattr(module, reference.name, None)
