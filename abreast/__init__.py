@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from abreast._logs import read_log, replay
     from abreast._runs import Run
     from abreast._scenarios import load_scenario, scenarios
+    from controllers.own_law import Gains, Leader, Shape
     from estimation.bounds.certificate import Certificate
+    from estimation.filters.estimator import Estimator
     from formation.pose import Motion
     from hil import __version__
     from hil.errors import CheckFailedError, UsageError
@@ -35,11 +37,15 @@ __all__ = [
     "Certificate",
     "CheckFailedError",
     "Estimates",
+    "Estimator",
     "GainProposal",
+    "Gains",
+    "Leader",
     "Log",
     "Motion",
     "Run",
     "Scenario",
+    "Shape",
     "Simulation",
     "SweepResult",
     "UsageError",
@@ -62,11 +68,15 @@ _HOMES = {
     "Certificate": "estimation.bounds.certificate",
     "CheckFailedError": "hil.errors",
     "Estimates": "abreast._estimates",
+    "Estimator": "estimation.filters.estimator",
     "GainProposal": "hil.simulate.gain_proposal",
+    "Gains": "controllers.own_law",
+    "Leader": "controllers.own_law",
     "Log": "hil.log.reader",
     "Motion": "formation.pose",
     "Run": "abreast._runs",
     "Scenario": "hil.scenario.schema",
+    "Shape": "controllers.own_law",
     "Simulation": "hil.simulate.simulation",
     "SweepResult": "abreast._analyses",
     "UsageError": "hil.errors",

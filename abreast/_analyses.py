@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from abreast._logs import LogLike, log_of
-from abreast._scenarios import ScenarioLike, scenario_of
+from abreast._scenarios import Own, ScenarioLike, scenario_of, text_of
 from estimation.bounds.certificate import Certificate
 from formation.angles import FloatArray
 from hil.replay.lab_calibration import Calibration, calibration_of
@@ -29,7 +29,7 @@ from hil.sweep.spec import load_sweep
 def simulate(
     scenario: ScenarioLike = "turtlebot3",
     *,
-    law: str | None = None,
+    law: Own | None = None,
     duration_s: float | None = None,
     stability: bool = False,
     out: str | os.PathLike[str] | None = None,
@@ -45,7 +45,7 @@ def simulate(
     >>> print(f"{found.rho[0]:.3f} m to {found.rho[-1]:.3f} m")
     0.832 m to 0.200 m
     """
-    changes = {"controller.law": law, "run.duration_s": duration_s}
+    changes = {"controller.law": text_of(law), "run.duration_s": duration_s}
     folder = None if out is None else Path(out)
     return experiment(scenario_of(scenario, changes), folder, stability=stability)
 
@@ -125,8 +125,8 @@ def sweep(
     runs: int | None = None,
     seed: int | None = None,
     duration_s: float | None = None,
-    estimators: Sequence[str] | None = None,
-    law: str | None = None,
+    estimators: Sequence[Own] | None = None,
+    law: Own | None = None,
     overrides: Overrides = (),
     workers: int = 1,
     scheduler: str | None = None,
@@ -146,9 +146,10 @@ def sweep(
     >>> [(cell["loss"], cell["estimator"]) for cell in found.cells]
     [(0.0, 'ekf'), (0.0, 'ukf'), (0.2, 'ekf'), (0.2, 'ukf')]
     """
-    texts = [*override_texts(overrides), *([] if law is None else [f"controller.law={law}"])]
+    texts = [*override_texts(overrides), *([] if law is None else [f"controller.law={text_of(law)}"])]
+    kinds = None if estimators is None else [text_of(each) for each in estimators]
     given = spec if isinstance(spec, Mapping) else os.fspath(spec)
-    chosen = load_sweep(given, texts, runs=runs, seed=seed, duration_s=duration_s, estimators=estimators)
+    chosen = load_sweep(given, texts, runs=runs, seed=seed, duration_s=duration_s, estimators=kinds)
     if out is None:
         with tempfile.TemporaryDirectory(prefix="abreast-") as folder:
             result = fly_sweep(chosen, Path(folder), workers=workers, scheduler=scheduler, progress=_quiet)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from abreast._estimates import Estimates, estimates_of
-from abreast._scenarios import ScenarioLike, scenario_of
+from abreast._scenarios import Own, ScenarioLike, scenario_of, text_of
 from formation.angles import FloatArray
 from hil.errors import UsageError
 from hil.replay.pose_tracks import PoseTracks, estimates_of_tracks
@@ -26,7 +26,7 @@ def estimate(
     follower: ArrayLike,
     *,
     scenario: ScenarioLike = "turtlebot3",
-    estimator: str = "ekf",
+    estimator: Own = "ekf",
     own_motion: str = "auto",
     v2: ArrayLike | None = None,
     u2: ArrayLike | None = None,
@@ -40,8 +40,8 @@ def estimate(
     ``v2``, ``u2`` (n,): the follower's measured speed [m/s] and turn rate [rad/s] at the same times; without
     them its own track tells its motion. ``scenario``: whose noise and limits of the leader the
     estimator goes by (``estimator.sigma_position``, ``leader.k_v`` ...). ``estimator``: ``ekf``, ``ukf``,
-    ``imm`` ... or ``smoother``, which looks at all rows for each. ``own_motion``: ``odometry`` (v2, u2),
-    ``mocap`` (its track), ``fused`` (both), or ``auto``: odometry if it is there.
+    ``imm`` ... ``smoother``, which looks at all rows for each, or your own. ``own_motion``: ``odometry``
+    (v2, u2), ``mocap`` (its track), ``fused`` (both), or ``auto``: odometry if it is there.
 
     Returns :class:`Estimates` with n rows. Raises :class:`UsageError`, one line, for arrays that do not fit
     together, times that do not increase, headings in degrees, and if no row gives an estimate.
@@ -68,7 +68,7 @@ def estimate(
     chosen = scenario_of(
         scenario,
         {
-            "estimator.kind": estimator,
+            "estimator.kind": text_of(estimator),
             "estimator.own_motion": _source(own_motion, tracks.motion),
             # Rows have one time only: when they came nobody knows.
             "estimator.clock": "trusted",

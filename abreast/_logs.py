@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from abreast._runs import Run, run_of
+from abreast._scenarios import Own, text_of
 from formation.collector import collector_paused
 from hil.errors import CheckFailedError
 from hil.judge.replayed import ReplayChoice, replayed
@@ -41,7 +42,8 @@ def log_of(given: LogLike) -> Log:
 def replay(
     log: LogLike,
     *,
-    estimator: str | None = None,
+    estimator: Own | None = None,
+    law: Own | None = None,
     overrides: Overrides = (),
     leader: str | None = None,
     follower: str | None = None,
@@ -53,12 +55,12 @@ def replay(
 ) -> Run:
     """Put a log through the very steps that run live, and judge what comes out: ``abreast replay``.
 
-    ``estimator``, ``overrides`` (values by ``section.key``): in place of the log's. ``leader``,
-    ``follower``: names of the bodies; of a chain, the follower to look at. ``topic_map``: a file that names
-    the topics of a log that is not abreast's. ``from_s``, ``to_s`` [s] limit what is judged. ``verify``:
-    compare with what was recorded, bit for bit, and raise :class:`CheckFailedError` if anything differs.
-    ``certify``: judge a guaranteed error radius of every estimate too. Raises :class:`UsageError` for a log
-    that cannot be read or replayed so.
+    ``estimator``, ``overrides`` (values by ``section.key``): in place of the log's. ``law``: where the log's
+    own is now, or another to judge by. ``leader``, ``follower``: names of the bodies; of a chain, the
+    follower to look at. ``topic_map``: a file that names the topics of a log that is not abreast's.
+    ``from_s``, ``to_s`` [s] limit what is judged. ``verify``: compare with what was recorded, bit for bit,
+    and raise :class:`CheckFailedError` if anything differs. ``certify``: judge a guaranteed error radius of
+    every estimate too. Raises :class:`UsageError` for a log that cannot be read or replayed so.
 
     >>> import abreast
     >>> scenario = abreast.load_scenario("turtlebot3", {"run.duration_s": 4.0})
@@ -72,7 +74,8 @@ def replay(
     given = log_of(log)
     chart = None if topic_map is None else os.fspath(topic_map)
     choice = ReplayChoice(
-        estimator=estimator,
+        estimator=text_of(estimator),
+        law=text_of(law),
         leader=leader,
         follower=follower,
         chart=chart,

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
+from hil.extensions.reference import brought
 from hil.scenario import files
 from hil.scenario.schema import Scenario
+
+Own = str | Callable[..., Any]
+"""A law or an estimator: its name, ``file.py:name`` or ``package.module:name``, or a function at hand."""
 
 ScenarioLike = Scenario | str | os.PathLike[str]
 """A scenario, or the name of a shipped one, or a path to a TOML file."""
@@ -43,3 +47,8 @@ def scenario_of(given: ScenarioLike, changes: Mapping[str, Any] | None = None) -
     if isinstance(given, Scenario):
         return files.with_overrides(given, changed) if changed else given
     return load_scenario(given, changed)
+
+
+def text_of(given: Own | None) -> str | None:
+    """A law or an estimator as scenarios name it."""
+    return brought(given) if callable(given) else given

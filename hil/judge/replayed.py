@@ -31,9 +31,9 @@ class ReplayChoice:
     """What a log is replayed by, and what is judged.
 
     ``estimator``, ``law``: in place of the log's, or where its own are now. ``leader``, ``follower``: names
-    of bodies; in a chain ``follower`` is the one to look at, and without it all are. ``chart``: topic map of a log that is not ours. ``from_s``,
-    ``to_s`` [s] limit what is judged. ``verify``: whether outputs are compared with the recorded ones.
-    ``certify``: whether certified estimates are made.
+    of bodies; in a chain ``follower`` is the one to look at, and without it all are. ``chart``: topic map of
+    a log that is not ours. ``from_s``, ``to_s`` [s] limit what is judged. ``verify``: whether outputs are
+    compared with the recorded ones. ``certify``: whether certified estimates are made.
     """
 
     estimator: str | None = None
