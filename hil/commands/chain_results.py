@@ -12,7 +12,7 @@ from hil.errors import CheckFailedError
 from hil.judge.chain_pairs import driven_trajectory
 from hil.judge.chain_summary import summarise_chain
 from hil.judge.chain_text import print_chain
-from hil.judge.replay_verdict import evaluated, violated_bounds
+from hil.judge.replay_verdict import evaluated, print_fed, violated_bounds
 from hil.judge.replayed import Replayed
 from hil.judge.run_data import RunData, run_data_of_link
 from hil.log.reader import Log
@@ -42,6 +42,7 @@ def leave_replay(
 ) -> None:
     """Leave what came of the replay of a chain's log where it is wished, print it, and check it."""
     summary = done.summary
+    print_fed(log, *done.played)
     if out is not None:
         _write(done.scenario, done.runs, summary, made_folder(out), "replay.png")
         for run_data in done.runs:

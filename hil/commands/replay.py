@@ -63,7 +63,7 @@ def command(
     --from and --to are seconds since the leader set off, for imported recordings the source's own time; the
     steps always begin where the log does.
     """
-    from hil.judge.replay_verdict import violated_bounds
+    from hil.judge.replay_verdict import print_fed, violated_bounds
     from hil.judge.replayed import ReplayChoice, chain_in, replayed
     from hil.judge.summary_text import print_summary
     from hil.log.reader import read_log
@@ -89,6 +89,7 @@ def command(
         return
     done = replayed(given, choice)
     (played,), (run_data,), summary = done.played, done.runs, done.summary
+    print_fed(given, played)
     _write(run_data, summary, table, out)
     print_summary(summary)
     for name, what in (("commands", "commands to the robot"), ("certified", "certified estimates")):

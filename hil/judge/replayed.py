@@ -8,14 +8,22 @@ from typing import Any
 
 from hil.errors import UsageError
 from hil.judge.chain_summary import summarise_chain
-from hil.judge.replay_verdict import parity_json, refuse_other_steps, run_data_of_replay, why_not_same
+from hil.judge.replay_verdict import (
+    fed_json,
+    parity_json,
+    refuse_other_steps,
+    run_data_of_replay,
+    why_not_same,
+)
 from hil.judge.run_data import RunData
 from hil.judge.summary import summarise
-from hil.log.metadata import RECORD, scenario_of
+from hil.log.description import RECORD
+from hil.log.metadata import scenario_of
 from hil.log.own_sources import with_sources
 from hil.log.reader import Log
+from hil.replay.feeding import guessed_link, why_guessed
 from hil.replay.odometry_alignment import judge_own_motion
-from hil.replay.rerun import Replay, replay, replay_chain, replay_foreign, replay_link
+from hil.replay.rerun import Replay, replay, replay_chain, replay_fed, replay_foreign, replay_link
 from hil.replay.topic_map import load_topic_map
 from hil.scenario.brought import settled_references
 from hil.scenario.certify import CERTIFY, same_steps
@@ -88,6 +96,7 @@ def replayed(log: Log, choice: ReplayChoice) -> Replayed:
         summary["own_motion"] = own_motion
     if choice.verify:
         summary["parity"] = parity_json(played)
+    summary |= fed_json(played)
     return Replayed(summary, (run_data,), (played,), played.scenario)
 
 
@@ -111,6 +120,8 @@ def _replayed_chain(log: Log, own: Scenario, choice: ReplayChoice, changes: Sequ
     played = replay_chain(log, chosen)
     runs = tuple(run_data_of_replay(log, each, choice.from_s, choice.to_s) for each in played)
     summary = summarise_chain(chosen, runs)
+    for pair, each in zip(summary["pairs"], played, strict=True):
+        pair |= fed_json(each)
     if choice.verify:
         summary["parity"] = parity_json(*played)
         for pair, each in zip(summary["pairs"], played, strict=True):
@@ -127,7 +138,8 @@ def _played(log: Log, choice: ReplayChoice, changes: Sequence[Overrides]) -> Rep
         return replay_foreign(log, chart)
     own = scenario_of(log)
     if own is None:
-        return replay(log)
+        link = guessed_link(log, choice.leader, choice.follower, *changes)
+        return replay_fed(log, link, why_guessed(link))
     if chain_of(own) is not None and choice.follower is not None:
         _refuse_leader(choice.leader)
         link = link_of(with_overrides(own, *changes), choice.follower)

@@ -62,7 +62,7 @@ def test_prop_2_at_hand_drives_as_the_shipped_one(scenario: Scenario, tmp_path: 
     assert own.summary["law"]["name"].endswith(":prop_2")
     again = abreast.replay(tmp_path / "own.mcap", verify=True)
     assert again.summary["parity"]["commands"]["mismatched"] == 0
-    assert np.array_equal(abreast.simulate(scenario, law=prop_2).rho, abreast.simulate(scenario).rho)
+    assert np.array_equal(abreast.simulate(scenario, law=prop_2).poses, abreast.simulate(scenario).poses)
 
 
 def test_an_estimator_at_hand_is_about_the_ekf(scenario: Scenario) -> None:
