@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from estimation.tracking.estimate import QUANTITIES
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
-from hil.wire.message_types import LeaderEstimate
+from hil.replay.pose_tracks import ToldEstimate
 
 MISSING = "missing"
 """Status of a row that has no estimate."""
@@ -79,7 +79,7 @@ class Estimates:
 
 
 def estimates_of(
-    t: FloatArray, made: Sequence[LeaderEstimate | None], reasons: Sequence[str] | None = None
+    t: FloatArray, made: Sequence[ToldEstimate | None], reasons: Sequence[str] | None = None
 ) -> Estimates:
     """Estimates at times (n,) as arrays; ``reasons``: why there is none where there is none."""
     numbers = np.full((len(made), _KNOWN), math.nan)
@@ -101,10 +101,6 @@ def estimates_of(
     )
 
 
-def _numbers(estimate: LeaderEstimate) -> list[float]:
-    variances = estimate.covariance[:: len(QUANTITIES) + 1].tolist()
-    return [
-        *(getattr(estimate, name) for name in _SEEN),
-        *(math.sqrt(variance) if variance >= 0.0 else math.nan for variance in variances),
-        *(getattr(estimate, name) for name in _BOUNDS),
-    ]
+def _numbers(told: ToldEstimate) -> tuple[float, ...]:
+    deviations = (math.sqrt(variance) if variance >= 0.0 else math.nan for variance in told.variances)
+    return (*told.seen, *deviations, *told.bounds)

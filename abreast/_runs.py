@@ -13,6 +13,7 @@ from abreast._estimates import Estimates, estimates_of
 from formation.angles import FloatArray
 from hil.judge.run_data import RunData
 from hil.judge.true_states import Stamps, TrueStates
+from hil.replay.pose_tracks import told_by
 from hil.wire.messages import to_ns
 
 _S = 1e-9
@@ -105,7 +106,7 @@ def _run_of_pair(summary: Mapping[str, Any], run_data: RunData) -> Run:
     t = _seconds(capture_ns, zero_ns)
     return Run(
         summary,
-        estimates_of(t, run_data.estimates),
+        estimates_of(t, list(map(told_by, run_data.estimates))),
         _truth(t, TrueStates.of(run_data.truth).at(capture_ns)),
         _commands(run_data),
     )

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.tracking.estimate import QUANTITIES
 from formation.angles import FloatArray
 from formation.pose import Motion, Pose
 from formation.records import Rows, rows_of, store
@@ -19,11 +22,17 @@ from hil.nodes.node import Counts, Outgoing
 from hil.replay.smoothing import ListeningEstimator, smoothed_estimates
 from hil.scenario.schema import Scenario
 from hil.wire import topics
+from hil.wire.cdr import STAMP_BYTES, aligned
 from hil.wire.events import Event
 from hil.wire.message_types import LeaderEstimate
-from hil.wire.messages import decode_as, to_ns
+from hil.wire.messages import to_ns
 from hil.wire.templates import frame_template, odometry_template
 from hil.wire.topics import topics_of
+
+_SEEN, _ELEMENTS = 2 + len(QUANTITIES), len(QUANTITIES) ** 2
+_NUMBERS = struct.Struct(f"<{_SEEN}d16x{_ELEMENTS}d8xB")
+"""From rho to the status, without v2, u2 and the NIS."""
+_BOUNDS = struct.Struct("<3d")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,6 +49,19 @@ class PoseTracks:
     motion: FloatArray | None = None
 
 
+class ToldEstimate(NamedTuple):
+    """Numbers of an estimate's message: ``seen`` rho, alpha2 and the five quantities, ``variances`` of these.
+
+    ``bounds`` of v1, alpha1 and h. Units and signs as in ``LeaderEstimate.msg``.
+    """
+
+    status: int
+    reason: str
+    seen: tuple[float, ...]
+    variances: tuple[float, ...]
+    bounds: tuple[float, ...]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackEstimates:
     """For every row the estimate that it led to, or None, and then why: the cause by which it was refused.
@@ -47,7 +69,7 @@ class TrackEstimates:
     The reason is empty for a row that was not seen. ``refused``: all that was, by cause, odometry too.
     """
 
-    estimates: tuple[LeaderEstimate | None, ...]
+    estimates: tuple[ToldEstimate | None, ...]
     reasons: tuple[str, ...]
     refused: Counts
 
@@ -60,7 +82,8 @@ def estimates_of_tracks(tracks: PoseTracks, scenario: Scenario) -> TrackEstimate
     if scenario.estimator.kind == "smoother":
         listening = ListeningEstimator(scenario)
         fed = _fed(listening, tracks)
-        by_capture = {to_ns(each.header.stamp): each for each in smoothed_estimates(listening).estimates}
+        smoothed_ones = smoothed_estimates(listening).estimates
+        by_capture = {to_ns(each.header.stamp): told_by(each) for each in smoothed_ones}
         smoothed = tuple(by_capture.get(at_ns) for at_ns in tracks.t_ns.tolist())
         return TrackEstimates(smoothed, fed.reasons, fed.refused)
     return _fed(EstimatorNode(scenario), tracks)
@@ -69,7 +92,7 @@ def estimates_of_tracks(tracks: PoseTracks, scenario: Scenario) -> TrackEstimate
 def _fed(node: EstimatorNode, tracks: PoseTracks) -> TrackEstimates:
     feed, times = _Feed(tracks, node.scenario), tracks.t_ns.tolist()
     state = node.begin(times[0])
-    estimates: list[LeaderEstimate | None] = []
+    estimates: list[ToldEstimate | None] = []
     reasons: list[str] = []
     for k, now_ns in enumerate(times):
         if feed.moved[k]:
@@ -82,7 +105,7 @@ def _fed(node: EstimatorNode, tracks: PoseTracks) -> TrackEstimates:
 
 def _taken(
     node: EstimatorNode, state: EstimatorState, frame: Event, now_ns: int
-) -> tuple[LeaderEstimate | None, str]:
+) -> tuple[ToldEstimate | None, str]:
     """What a frame led to."""
     before = state.refused
     _, sent = node.step(state, frame, now_ns)
@@ -91,9 +114,32 @@ def _taken(
     return None, next(cause for cause, count in state.refused.items() if count > before.get(cause, 0))
 
 
-def _estimate_in(node: EstimatorNode, sent: tuple[Outgoing, ...]) -> LeaderEstimate | None:
-    return next(
-        (decode_as(each.payload, LeaderEstimate) for each in sent if each.topic == node.topics.estimate), None
+def _estimate_in(node: EstimatorNode, sent: tuple[Outgoing, ...]) -> ToldEstimate | None:
+    told = (each.payload for each in sent if each.topic == node.topics.estimate)
+    return next((_read(payload, node.rules.times_at) for payload in told), None)
+
+
+def _read(payload: bytes, times_at: int) -> ToldEstimate:
+    """Read an estimate whose times stand at a place; ten times as fast as the general codec does it all."""
+    at = aligned(times_at + 2 * STAMP_BYTES, 8)
+    numbers = _NUMBERS.unpack_from(payload, at)
+    text_at = aligned(at + _NUMBERS.size, 4) + 4
+    bounds_at = aligned(text_at + int.from_bytes(payload[text_at - 4 : text_at], "little"), 8)
+    reason = payload[text_at:bounds_at].partition(b"\0")[0].decode()
+    variances = numbers[_SEEN : _SEEN + _ELEMENTS : len(QUANTITIES) + 1]
+    return ToldEstimate(
+        numbers[-1], reason, numbers[:_SEEN], variances, _BOUNDS.unpack_from(payload, bounds_at)
+    )
+
+
+def told_by(message: LeaderEstimate) -> ToldEstimate:
+    """The same of a message."""
+    return ToldEstimate(
+        message.status,
+        message.reason,
+        tuple(getattr(message, name) for name in ("rho", "alpha2", *QUANTITIES)),
+        tuple(message.covariance[:: len(QUANTITIES) + 1].tolist()),
+        (message.bound_v1, message.bound_alpha1, message.bound_h),
     )
 
 
