@@ -63,6 +63,14 @@ class Log:
     ``metadata``: metadata records by name. ``topics``: type name by topic. ``encodings``: message encoding
     by topic. ``definitions``: ``ros2msg`` text by type name, where the log has one. ``messages``: how many
     there are, from ``start_ns`` to ``end_ns`` in log time (both None in a log without messages).
+
+    >>> import abreast
+    >>> scenario = abreast.load_scenario("turtlebot3", {"run.duration_s": 2.0})
+    >>> run = abreast.run_lockstep(scenario, log="some.mcap")
+    >>> log = abreast.read_log("some.mcap")
+    >>> first = next(log.records(["rigid_bodies"]))
+    >>> [body.rigid_body_name for body in log.decode(first).rigidbodies]
+    ['leader', 'follower']
     """
 
     path: Path
