@@ -15,7 +15,9 @@ from hil.judge.chain_summary import summarise_chain
 from hil.judge.chain_text import print_chain
 from hil.judge.replay_verdict import (
     evaluated,
+    fed_json,
     parity_json,
+    print_fed,
     refuse_other_steps,
     run_data_of_replay,
     violated_bounds,
@@ -66,6 +68,9 @@ def replay_run(log: Log, chosen: Scenario, wishes: Wishes) -> None:
     played = replay_chain(log, chosen)
     runs = [run_data_of_replay(log, each, wishes.from_s, wishes.to_s) for each in played]
     summary = summarise_chain(chosen, runs)
+    for pair, each in zip(summary["pairs"], played, strict=True):
+        pair |= fed_json(each)
+    print_fed(log, *played)
     if wishes.verify:
         summary["parity"] = parity_json(*played)
         for pair, each in zip(summary["pairs"], played, strict=True):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from formation.collector import collector_paused
+from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION
 from hil.errors import UsageError
 from hil.scenario.certify import CERTIFY
@@ -68,6 +69,8 @@ def daemon_command(name: str, summary: str) -> click.Command:
         if not (connect or listen or zenoh_config):
             connect = DEFAULT_ENDPOINT
         chosen = load_scenario(scenario, (*overrides, CERTIFY) if certify else overrides)
+        if name in HOSTED:
+            load_own_parts(chosen, estimates=name != "controller")
         needed = frozenset(filter(None, needs.split(",")))
         links = tuple(link_of(chosen, name) for name in dict.fromkeys(followers)) or links_of(chosen)
         order = Order(chosen, links, out, needed)

@@ -12,8 +12,10 @@ from typing import Any
 import click
 
 from formation.collector import collector_paused
+from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION
 from hil.errors import CheckFailedError, UsageError
+from hil.judge.made_by import law_failure
 from hil.log.report_json import print_json
 from hil.reports.judged_log import claimed, judge_log, made_folder
 from hil.scenario.certify import CERTIFY
@@ -26,8 +28,8 @@ from hil.scenario.schema import Scenario
 @click.argument("scenario", default="turtlebot3")
 @click.option("--duration", type=DURATION, metavar="S", help="Seconds from the leader's start to the stop.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all noise.")
-@click.option("--estimator", metavar="E", help="Estimator, such as ekf, ukf or imm.")
-@click.option("--law", metavar="L", help="Law of the follower.")
+@click.option("--estimator", metavar="E", help="Estimator: ekf, ukf, imm, or file.py:factory.")
+@click.option("--law", metavar="L", help="Law of the follower: independent, or file.py:function.")
 @click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Folder for results."
 )
@@ -65,6 +67,7 @@ def command(
     chosen = load_scenario(scenario, [*overrides, *options, *([CERTIFY] if certify else [])])
     refuse_unrunnable(chosen)
     links_of(chosen)
+    load_own_parts(chosen)
     folder = _folder(chosen, out)
     with claimed(folder):
         _run(chosen, folder, None if lockstep else _Live(listen, apart), as_json=as_json)
@@ -96,6 +99,7 @@ def _run(chosen: Scenario, folder: Path, live: _Live | None, *, as_json: bool) -
         if as_json:
             # How long it took is no part of the verdict, which is the same for every run of a seed.
             print_json(summary | timing)
+        failure = failure or law_failure(summary)
     finally:
         # Also if there is no room for a verdict, say: what went wrong first is what to tell.
         if failure:

@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import click
+
 from hil import __version__
 from hil.errors import UsageError
 from hil.judge.certified import certified_violations
 from hil.judge.run_data import RunData, run_data_of_link, run_data_of_log
-from hil.log.metadata import IMPORT, mode_of, version_of
+from hil.log.metadata import IMPORT, cut_in_front_s, mode_of, version_of
 from hil.log.reader import Log
 from hil.replay.re_execution import Parity
 from hil.replay.rerun import Replay
@@ -97,9 +99,24 @@ def parity_json(*played: Replay) -> dict[str, Any]:
     }
 
 
+def fed_json(played: Replay) -> dict[str, Any]:
+    """Part of a summary that says why inputs were fed in log order; empty where they were not."""
+    return {"fed": {"why": played.fed}} if played.fed else {}
+
+
+def print_fed(log: Log, *played: Replay) -> None:
+    """Say on stderr why inputs were fed in log order, a line for every follower for which they were."""
+    for each in played:
+        if each.fed:
+            whose = f" of {each.link.follower}" if each.link.in_chain else ""
+            click.echo(f"log {log.path}: its inputs{whose} are fed in log order: {each.fed}", err=True)
+
+
 def why_not_same(log: Log, played: Replay) -> str:
     """What speaks against a replay that repeats the log bit for bit; empty if nothing does."""
     whose = f" of {played.link.follower}" if played.link.in_chain else ""
+    if played.fed:
+        return f"log {log.path}: nothing to verify{whose}: {played.fed}"
     compared = sum(parity.compared for parity in played.parity.values())
     if not compared:
         return f"log {log.path}: holds no estimates{whose}, so there is nothing to verify"
@@ -116,9 +133,20 @@ def why_not_same(log: Log, played: Replay) -> str:
     if gap_s > _LONG_GAP_S:
         # Whatever was consumed in the meantime, its receipts went by too.
         lost = lost or f"the log has nothing of {gap_s:.1f} s before: nobody can repeat what it misses"
-    reasons = [reason for reason in (lost, _other_version(log)) if reason]
+    reasons = [reason for reason in (lost, _cut_in_front(log), _other_version(log)) if reason]
     question = "did every daemon run with the recorder's scenario, and with this version of abreast?"
     return f"log {log.path}: {', '.join(wrong)}; {'; '.join(reasons) or question}"
+
+
+def _cut_in_front(log: Log) -> str:
+    """That a log lacks its beginning; empty if it does not, or does not say."""
+    missing_s = cut_in_front_s(log)
+    if not missing_s:
+        return ""
+    return (
+        f"its first {missing_s:.1f} s were cut off, and nobody can repeat what rests on them; verify the "
+        "log that begins with the run"
+    )
 
 
 def _other_version(log: Log) -> str:

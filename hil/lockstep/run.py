@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from hil.emulator.node import EmulatorNode, EmulatorState
 from hil.errors import CheckFailedError
 from hil.lockstep.lockstep import EPOCH_NS, Lockstep
+from hil.log.described_log import DescribedLog
 from hil.log.metadata import certificate_metadata, log_metadata
-from hil.log.writer import LogWriter
 from hil.nodes.link_nodes import controller_node, estimator_node
 from hil.nodes.node import Node, Outgoing, outgoing
 from hil.scenario.certificate import certificate_json, certificate_of
@@ -51,7 +51,7 @@ def run_lockstep(scenario: Scenario, log_path: Path, ready: Prepared | None = No
     ``ready``: if it has been prepared before. Raises :class:`CheckFailedError` if the leader never sets off.
     """
     nodes, metadata = ready or prepared(scenario)
-    with LogWriter(log_path, metadata) as log:
+    with DescribedLog(log_path, metadata) as log:
 
         def record(message: Outgoing, now_ns: int) -> None:
             log.write(message.topic, message.typename, message.payload, now_ns, now_ns)

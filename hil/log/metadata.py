@@ -9,13 +9,14 @@ from typing import Any
 
 from hil import __version__
 from hil.errors import UsageError
+from hil.log.description import ORIGIN, RECORD
 from hil.log.older_keys import with_older_keys
+from hil.log.own_sources import source_metadata
 from hil.log.reader import Log
 from hil.log.report_json import as_json
 from hil.scenario.files import build_scenario, scenario_text
 from hil.scenario.schema import Scenario
 
-RECORD = "abreast"
 CERTIFICATE = "abreast.certificate"
 IMPORT = "import"
 """Mode of a log that was made from another recording."""
@@ -23,15 +24,14 @@ IMPORT = "import"
 
 def log_metadata(scenario: Scenario, mode: str) -> dict[str, dict[str, str]]:
     """Metadata records of a log; ``mode`` is live, lockstep or import."""
-    return {
-        RECORD: {
-            "version": __version__,
-            "mode": mode,
-            "scenario": scenario.name,
-            "seed": str(scenario.run.seed),
-            "scenario_toml": scenario_text(scenario),
-        }
+    record = {
+        "version": __version__,
+        "mode": mode,
+        "scenario": scenario.name,
+        "seed": str(scenario.run.seed),
+        "scenario_toml": scenario_text(scenario),
     }
+    return {RECORD: record} | source_metadata(scenario)
 
 
 def scenario_of(log: Log) -> Scenario | None:
@@ -57,6 +57,14 @@ def mode_of(log: Log) -> str | None:
 def version_of(log: Log) -> str | None:
     """Version of abreast that wrote a log; None for a log that is not ours or does not say."""
     return log.metadata.get(RECORD, {}).get("version")
+
+
+def cut_in_front_s(log: Log) -> float:
+    """Seconds of log time that are missing in front of a log; 0 where none are known to be."""
+    begun_ns = log.metadata.get(ORIGIN, {}).get("begun_ns", "")
+    if log.start_ns is None or not begun_ns.isdecimal():
+        return 0.0
+    return max(0.0, (log.start_ns - int(begun_ns)) * 1e-9)
 
 
 def certificate_metadata(certificate: Mapping[str, Any]) -> dict[str, dict[str, str]]:

@@ -6,7 +6,8 @@ import os
 import struct
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import takewhile
 from pathlib import Path
 from typing import BinaryIO
 
@@ -19,10 +20,12 @@ from mcap.summary import Summary
 from zstandard import ZstdError
 
 from hil.errors import UsageError
+from hil.log.description import SETTLED_NS, described
 from hil.log.mcap_chunks import MAGIC
 from hil.log.mcap_order import entries_in_order
 from hil.wire.message_types import Message
 from hil.wire.messages import decode, typestore_of
+from hil.wire.topics import LOG
 
 DAMAGE = (
     McapError,
@@ -169,7 +172,7 @@ def read_log(path: Path) -> Log:
         stream.seek(0)
         metadata = {record.name: dict(record.metadata) for record in SeekingReader(stream).iter_metadata()}
         ordered = [channels[number] for number in sorted(channels)]
-        return Log(
+        log = Log(
             path=path,
             metadata=metadata,
             topics={channel.topic: _typename(schemas.get(channel.schema_id)) for channel in ordered},
@@ -184,6 +187,17 @@ def read_log(path: Path) -> Log:
             end_ns=end_ns if messages else None,
             indexed=indexed,
         )
+    return replace(log, metadata={**_told_in_messages(log), **metadata})
+
+
+def _told_in_messages(log: Log) -> dict[str, dict[str, str]]:
+    """What the log says of itself on a topic; other tools that copy logs leave metadata behind."""
+    said = log.records([LOG]) if LOG in log.topics else iter(())
+    first = next(said, None)
+    if first is None:
+        return {}
+    settled = takewhile(lambda record: record.log_ns < first.log_ns + SETTLED_NS, said)
+    return described(record.payload for record in (first, *settled))
 
 
 def check_mcap(path: Path) -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from formation.pose import Motion, Pose
 from hil.emulator.lab_messages import frame_message, odometry_message
+from hil.log.described_log import DescribedLog
 from hil.log.metadata import IMPORT, certificate_metadata, log_metadata
-from hil.log.writer import LogWriter
 from hil.recordings.column_map import ColumnMap
 from hil.recordings.csv_table import Row, read_rows
 from hil.scenario.certificate import certificate_json, certificate_of
@@ -42,7 +42,7 @@ def import_csv(recording: Path, chart: ColumnMap, out: Path) -> Imported:
         certificate_json(certificate_of(chart.scenario, driven=False))
     )
     metadata["source"] = {"file": recording.name, "map": chart.path.name}
-    with LogWriter(out, metadata) as log:
+    with DescribedLog(out, metadata) as log:
         try:
             for number, row in enumerate(rows):
                 for topic, message in _messages(number, row, chart, names):

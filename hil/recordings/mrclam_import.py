@@ -13,8 +13,8 @@ from estimation.calibration.smoothed_track import poses_at, smoothed_motion
 from formation.angles import FloatArray
 from formation.pose import Motion, Pose
 from hil.emulator.lab_messages import frame_message, odometry_message
+from hil.log.described_log import DescribedLog
 from hil.log.metadata import IMPORT, certificate_metadata, log_metadata
-from hil.log.writer import LogWriter
 from hil.recordings.csv_import import Imported
 from hil.recordings.mrclam_folder import Pair, read_pair
 from hil.scenario.certificate import certificate_json, certificate_of
@@ -50,7 +50,7 @@ def import_mrclam(folder: Path, leader: int, follower: int, out: Path) -> Import
     )
     metadata["source"] = {"folder": folder.name, "leader": pair.leader, "follower": pair.follower}
     streams = (_odometry(pair, topics_of(scenario).odom), _frames(pair), _truth(pair))
-    with LogWriter(out, metadata) as log:
+    with DescribedLog(out, metadata) as log:
         try:
             for stamp_ns, _, topic, message in heapq.merge(*streams, key=lambda each: each[:2]):
                 log.write(topic, typename_of(message), encode(message), stamp_ns, stamp_ns)

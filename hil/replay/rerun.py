@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from hil.errors import UsageError
-from hil.log.events import check_inputs, logged_events, recorded_commands, recorded_estimates
+from hil.log.events import Recorded, check_inputs, logged_events, recorded_commands, recorded_estimates
 from hil.log.metadata import scenario_of
 from hil.log.reader import Log
 from hil.nodes.controller import ControllerState
 from hil.nodes.estimator import EstimatorNode, EstimatorState
 from hil.nodes.link_nodes import controller_node, estimator_node
 from hil.nodes.node import Outgoing
+from hil.replay.feeding import why_edited
 from hil.replay.foreign_log import foreign_events
 from hil.replay.re_execution import (
     Execution,
@@ -30,6 +31,7 @@ from hil.scenario.certify import same_steps
 from hil.scenario.links import Link, links_of
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
+from hil.wire.events import Event
 from hil.wire.messages import decode_as, typename_of
 
 M = TypeVar("M", bound=msg.Message)
@@ -43,7 +45,8 @@ class Replay:
     with the recorded ones; empty where the log was estimated anew. ``missing_inputs``: inputs that were
     consumed live but are not in the log. ``certified``: estimates with radii, where these are asked for.
     ``controller``: None where there were no commands to repeat. ``restarts``: how often each node was started
-    again during the run.
+    again during the run. ``fed``: why its inputs were fed in log order though nobody asked for that; empty
+    where they were not.
     """
 
     link: Link
@@ -55,6 +58,7 @@ class Replay:
     missing_inputs: int = 0
     certified: tuple[msg.CertifiedEstimate, ...] = ()
     restarts: Mapping[str, int] = field(default_factory=dict)
+    fed: str = ""
 
     @property
     def scenario(self) -> Scenario:
@@ -103,6 +107,8 @@ def replay_link(log: Log, chosen: Link, own: Link) -> Replay:
         check_inputs(log, chosen.scenario)
         return _estimated_anew(chosen, node, execute(node, logged_events(log, node.subscribes)))
     index = index_by_digest(logged_events(log, node.subscribes))
+    if why := _why_edited(log, node, recorded, index):
+        return replay_fed(log, chosen, why)
     same = same_steps(chosen.scenario, own.scenario)
     execution = re_execute(node, node.topics.estimate, recorded, index, same_node=same)
     if not same:
@@ -114,6 +120,18 @@ def replay_link(log: Log, chosen: Link, own: Link) -> Replay:
     return _with_commands(log, chosen, execution, parity)
 
 
+def replay_fed(log: Log, link: Link, why: str) -> Replay:
+    """Put the inputs of a log through the estimator of a link in log order, each at its log time.
+
+    ``why``: what keeps them from being put through as they were consumed.
+    Raises :class:`UsageError` if the log lacks what the estimator needs.
+    """
+    check_inputs(log, link.scenario)
+    node = _estimator_of(link)
+    fed = _estimated_anew(link, node, execute(node, logged_events(log, node.subscribes)))
+    return replace(fed, fed=why)
+
+
 def replay_foreign(log: Log, chart: TopicMap) -> Replay:
     """Put another lab's log through the estimator of the scenario that its topic map leads to.
 
@@ -122,6 +140,16 @@ def replay_foreign(log: Log, chart: TopicMap) -> Replay:
     link = Link(chart.scenario)
     node = _estimator_of(link)
     return _estimated_anew(link, node, execute(node, foreign_events(log, chart)))
+
+
+def _why_edited(
+    log: Log, node: EstimatorNode, recorded: Sequence[Recorded], index: Mapping[int, Event]
+) -> str:
+    consumed = [receipt for output in recorded for receipt in output.consumed]
+    if all(digest in index for digest, _ in consumed):
+        return ""
+    logged = logged_events(log, node.subscribes)
+    return why_edited(consumed, ((event.digest, log_ns) for event, log_ns in logged))
 
 
 def _own_scenario(log: Log) -> Scenario:

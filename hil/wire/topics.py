@@ -27,6 +27,11 @@ TRUTH = "truth"
 DIAGNOSTICS = "diagnostics"
 STOP = "stop"
 MALFORMED = "malformed"
+LOG = "abreast/log"
+"""What a log says of itself, again and again; :mod:`hil.log.description`."""
+
+ONLY_IN_LOGS = (MALFORMED, LOG)
+"""Topics that are no part of what robots and daemons say: whoever records writes them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +107,7 @@ class Topics:
             DIAGNOSTICS: typename_of(DiagnosticArray),
             STOP: typename_of(String),
             MALFORMED: typename_of(Malformed),
+            LOG: typename_of(String),
         }
 
 

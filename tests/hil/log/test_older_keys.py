@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from hil.log import metadata
-from hil.log.metadata import RECORD, scenario_of
+from hil.log.description import RECORD
+from hil.log.metadata import scenario_of
 from hil.log.older_keys import BEFORE, with_older_keys
 from hil.log.reader import read_log
 from hil.scenario.files import scenario_text

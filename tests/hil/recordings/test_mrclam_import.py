@@ -74,6 +74,7 @@ def test_messages_come_in_the_order_of_their_stamps(log: Log) -> None:
         topics.RIGID_BODIES: 600,
         "robot5/odom": 600,
         topics.TRUTH: 600,
+        topics.LOG: 2,
     }
     first = decode_as(next(log.records(["robot5/odom"])).payload, Odometry)
     assert to_ns(first.header.stamp) == round((START_S + 0.005) * 1000) * 1_000_000
