@@ -78,7 +78,7 @@ def spent(pid: int) -> float:
 
 
 def go_first(pids: Iterable[int], policy: int) -> None:
-    """Schedule all threads of processes by a policy: SCHED_RR goes before others, SCHED_OTHER like them."""
+    """Schedule all threads of processes: before those of others by SCHED_RR, like them by SCHED_OTHER."""
     for pid in pids:
         for thread in Path(f"/proc/{pid}/task").iterdir():
             os.sched_setscheduler(int(thread.name), policy, os.sched_param(int(policy == os.SCHED_RR)))
