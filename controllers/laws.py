@@ -19,6 +19,8 @@ from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 from controllers.limits import Limits, clip
+from controllers.own_law import OwnLaw, asked_law
+from formation.address import NOWHERE, Address
 from formation.kernel import kernel
 from formation.line import Line, line_of
 from formation.pose import Motion
@@ -32,7 +34,7 @@ class LawSettings(NamedTuple):
 
     Gains mu1, mu2 [rad/s], spacing rho_0 [m] and mu_rho [1/m]; ``cos_b``, ``sin_b`` and
     ``sign`` as a :class:`~formation.station.Station` has them; tilt [rad]; limits v_max [m/s] and u_max
-    [rad/s], infinite for none.
+    [rad/s], infinite for none. ``own``: where a law of one's own is, in place of (4), (6) and (8).
     """
 
     mu1: float
@@ -45,6 +47,7 @@ class LawSettings(NamedTuple):
     tilt: float
     v_max: float
     u_max: float
+    own: Address
 
 
 @kernel
@@ -52,8 +55,10 @@ def law(settings: LawSettings, line: Line, v1: float, u1: float) -> Motion:
     """Wanted motion, not yet limited: speed (6), and steering (4) for the speed that the limit lets through.
 
     ``u1`` is the leader's turn rate [rad/s] to feed forward; 0 makes (8) of (6). Needs rho > 0 (or NaN, which
-    shows in the result).
+    shows in the result). A law of one's own is asked in their place, if there is one.
     """
+    if settings.own.function != 0:
+        return asked_law(settings.own, settings.sign, line, v1, u1)
     # The speed stays as wanted, so that whoever limits it sees that it had to; only (4) needs the driven one.
     wanted = speed(settings, line, v1, u1)
     driven = clip(wanted, settings.v_max)
@@ -103,8 +108,8 @@ class Gains:
 
     ``tilt`` [rad] is how far a follower that cannot drive as fast as it should may turn off the bearing of
     its station, towards a leader that is too far or away from one that is too near (see :func:`lean`);
-    0, as in the paper, not at all. Raises :class:`ValueError` unless mu1 and mu2 are positive and finite and
-    tilt lies in [0, pi/2).
+    0, as in the paper, not at all. ``own``: a law of one's own, in place of the paper's. Raises
+    :class:`ValueError` unless mu1 and mu2 are positive and finite and tilt lies in [0, pi/2).
     """
 
     mu1: float
@@ -112,6 +117,7 @@ class Gains:
     spacing: Spacing
     station: Station = ABREAST
     tilt: float = 0.0
+    own: OwnLaw | None = None
 
     def __post_init__(self) -> None:
         for name, value in (("mu1", self.mu1), ("mu2", self.mu2)):
@@ -124,6 +130,7 @@ class Gains:
         """The numbers for :func:`law`, within ``limits`` if there are any."""
         spacing, station = self.spacing, self.station
         v_max, u_max = (math.inf, math.inf) if limits is None else (limits.v_max, limits.u_max)
+        given = (self.mu1, self.mu2, spacing.mu_rho, spacing.rho_0, station.bearing, v_max, u_max)
         return LawSettings(
             self.mu1,
             self.mu2,
@@ -135,6 +142,7 @@ class Gains:
             self.tilt,
             v_max,
             u_max,
+            NOWHERE if self.own is None else self.own.at(*given),
         )
 
 

@@ -100,7 +100,8 @@ def change_step(
     there = at_side(settings, change.sign)
     if change.arrived or _may_take_over(there, line):
         return Led(change._replace(arrived=True), law(there, line, v1, u1))
-    return _led_round(change, there, line, v1, u1, dt)
+    # A law of one's own may not be told a turn rate at all; on the way it is as for (8).
+    return _led_round(change, there, line, v1, u1 if there.own.function == 0 else 0.0, dt)
 
 
 @kernel(inline=False)

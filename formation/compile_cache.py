@@ -28,7 +28,13 @@ _ROOT = Path(__file__).resolve().parent.parent
 _HOUSE = "formation|controllers|estimation|hil|abreast"
 _IMPORTS = re.compile(rf"^[ \t]*from ((?:{_HOUSE})[\w.]*) import (?:\(([^)]*)\)|([^\n]*))", re.MULTILINE)
 _PLAIN_IMPORTS = re.compile(rf"^[ \t]*import ((?:{_HOUSE})[\w.]*)", re.MULTILINE)
-_COMPILERS = ("formation.compiler", "formation.compiled_records", "formation.kernel_linking", __name__)
+_COMPILERS = (
+    "formation.compiler",
+    "formation.compiled_calls",
+    "formation.compiled_records",
+    "formation.kernel_linking",
+    __name__,
+)
 
 
 @functools.cache

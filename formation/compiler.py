@@ -1,8 +1,8 @@
 """The compiler behind :mod:`formation.kernel`: types, kernels and entries as numba has them.
 
-Only this module and its three neighbours import numba: :mod:`formation.compiled_records`,
-:mod:`formation.compile_cache` and :mod:`formation.kernel_linking`. What they rest on of its internals is
-held by ``tests/formation/test_kernel.py``.
+Only this module and its neighbours import numba: :mod:`formation.compiled_records`,
+:mod:`formation.compiled_calls`, :mod:`formation.compile_cache` and :mod:`formation.kernel_linking`. What they
+rest on of its internals is held by ``tests/formation/test_kernel.py``.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from numba.extending import infer_getattr, overload
 from formation import records
 from formation.collector import collector_paused
 from formation.compile_cache import cache_of, one_at_a_time
+from formation.compiled_calls import teach_calls
 from formation.compiled_records import record_type, teach_records
 from formation.kernel_linking import EntryCompiler, KernelCompiler
 from formation.marked import MARKED, PLAIN, Marked
@@ -32,6 +33,7 @@ DISPATCHERS: dict[Any, Any] = {}
 
 _taught = 0
 teach_records()
+teach_calls()
 
 
 def type_of(kind: Any) -> Any:

@@ -23,12 +23,13 @@ COMMANDS = {
     "calibrate": "find the offsets of a range and bearing sensor that mocap has watched",
     "recover": "make a cut-off log whole",
     "emulator": "the emulated robots and motion capture, as a daemon",
+    "follower": "estimator and controller in one process, as a daemon",
     "estimator": "the estimator, as a daemon",
     "controller": "the controller, as a daemon",
     "recorder": "the recorder, as a daemon",
 }
 _MODULES = {"import": "import_recording"}
-_DAEMONS = ("emulator", "estimator", "controller", "recorder")
+_DAEMONS = ("emulator", "follower", "estimator", "controller", "recorder")
 
 
 class _LazyGroup(click.Group):

@@ -32,8 +32,8 @@ ROOMS = {
         "models", "own_motion", "time", "filters", "tracking", "bounds", "consistency", "calibration",
     ),
     "hil": (
-        "scenario", "wire", "log", "nodes", "emulator", "lockstep", "live", "replay", "recordings", "judge",
-        "figures", "reports", "sweep", "simulate", "commands",
+        "extensions", "scenario", "wire", "log", "nodes", "emulator", "lockstep", "live", "replay",
+        "recordings", "judge", "figures", "reports", "sweep", "simulate", "commands",
     ),
 }  # fmt: skip
 """Rooms of the packages that have some, lower ones first: each may import those before it."""
@@ -56,7 +56,7 @@ COMPILER = {"formation/kernel.py", "formation/compile_cache.py"}
 
 COMPILES = {
     "formation/compiler.py", "formation/compiled_records.py", "formation/compile_cache.py",
-    "formation/kernel_linking.py",
+    "formation/kernel_linking.py", "formation/compiled_calls.py",
 }  # fmt: skip
 """What alone may import numba: all else is plain Python, which runs without it."""
 

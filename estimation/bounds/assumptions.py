@@ -19,7 +19,8 @@ class Assumptions:
     two measurements [s]. Of the leader v_eps <= v1 <= k_v [m/s] and |u1| <= k_u [rad/s]; ``speeds``: the
     speeds that it will really drive, for the formation. Of the law mu1, mu2 [rad/s] and the spacing.
     ``noise``: in words, where eps comes from. ``side`` that the follower drives on. ``unproved``: why the
-    theory of the formation does not speak of this pair, empty if it does.
+    theory of the formation does not speak of this pair, empty if it does; ``unknown_steering``: why that of
+    its steering does not.
     """
 
     eps: float
@@ -34,6 +35,7 @@ class Assumptions:
     noise: str
     side: Side = Side.RIGHT
     unproved: str = ""
+    unknown_steering: str = ""
 
     @property
     def acceleration(self) -> float:

@@ -162,6 +162,8 @@ def _alpha2_ultimate(given: Assumptions, M_alpha2: float) -> Claim:
         f"|alpha2_dot error| <= M_alpha2 = {M_alpha2:.3g} rad/s",
         "steering law (4), carried out at once",
     )
+    if given.unknown_steering:
+        return Claim({}, assumes, given.unknown_steering)
     if M_alpha2 >= given.mu2:
         why = (
             f"M_alpha2 = {M_alpha2:.3g} rad/s >= mu2 = {given.mu2:g} rad/s: "

@@ -1,4 +1,4 @@
-"""``abreast emulator``, ``estimator``, ``controller``, ``recorder``: one daemon each, in the foreground."""
+"""``abreast emulator``, ``follower``, ``estimator`` and so on: one daemon each, in the foreground."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ from typing import TYPE_CHECKING
 import click
 
 from formation.collector import collector_paused
+from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION
 from hil.errors import UsageError
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario
-from hil.scenario.links import HOSTING, Link, link_of, links_of
+from hil.scenario.links import HOSTED, Link, link_of, links_of
 from hil.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     from hil.live.daemon import Worker
+    from hil.live.node_worker import Parting
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
@@ -27,7 +29,7 @@ DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 class Order:
     """What a daemon is started for.
 
-    ``links``: the followers that an estimator or a controller serves. ``out``: the recorder's log.
+    ``links``: the followers that it serves, if it serves any. ``out``: the recorder's log.
     ``needs``: the daemons that the emulator waits for.
     """
 
@@ -67,6 +69,8 @@ def daemon_command(name: str, summary: str) -> click.Command:
         if not (connect or listen or zenoh_config):
             connect = DEFAULT_ENDPOINT
         chosen = load_scenario(scenario, (*overrides, CERTIFY) if certify else overrides)
+        if name in HOSTED:
+            load_own_parts(chosen, estimates=name != "controller")
         needed = frozenset(filter(None, needs.split(",")))
         links = tuple(link_of(chosen, name) for name in dict.fromkeys(followers)) or links_of(chosen)
         order = Order(chosen, links, out, needed)
@@ -100,10 +104,10 @@ def daemon_command(name: str, summary: str) -> click.Command:
     ]
     if name == "recorder":
         options.append(click.Option(["--out"], type=path, required=True, help="Log to write (.mcap)."))
-    if name in HOSTING:
+    if name in HOSTED:
         whom = "A follower of a chain to serve, by its name; may be given again. Without it all."
         options.append(click.Option(["--follower", "followers"], multiple=True, metavar="NAME", help=whom))
-    if name == "estimator":
+    if name in ("follower", "estimator"):
         what = "Publish a guaranteed error radius of every estimate."
         options.append(click.Option(["--certify"], is_flag=True, help=what))
     if name == "emulator":
@@ -116,23 +120,42 @@ def daemon_command(name: str, summary: str) -> click.Command:
 
 def _emulator(order: Order) -> Worker:
     from hil.emulator.node import EmulatorNode
-    from hil.live.daemon import NodeWorker
+    from hil.live.node_worker import NodeWorker
 
     return NodeWorker([EmulatorNode(order.scenario, order.needs)])
 
 
 def _estimator(order: Order) -> Worker:
-    from hil.live.daemon import NodeWorker
+    from hil.live.node_worker import NodeWorker
     from hil.nodes.link_nodes import estimator_node
 
     return NodeWorker([estimator_node(link) for link in order.links])
 
 
 def _controller(order: Order) -> Worker:
-    from hil.live.daemon import NodeWorker
+    from hil.live.node_worker import NodeWorker
     from hil.nodes.link_nodes import controller_node
 
-    return NodeWorker([controller_node(link) for link in order.links], parting="the controller ended")
+    return NodeWorker([controller_node(link) for link in order.links], parting=_parting("controller", order))
+
+
+def _follower(order: Order) -> Worker:
+    from hil.live.node_worker import NodeWorker
+    from hil.nodes.link_nodes import controller_node, estimator_node
+
+    controllers = [controller_node(link) for link in order.links]
+    return NodeWorker(
+        [*map(estimator_node, order.links), *controllers],
+        within=[node.topics.estimate for node in controllers],
+        parting=_parting("follower", order),
+    )
+
+
+def _parting(name: str, order: Order) -> Parting:
+    from hil.live.node_worker import Parting
+    from hil.nodes.link_nodes import standstill
+
+    return Parting(f"the {name} ended", lambda now_ns: [standstill(link, now_ns) for link in order.links])
 
 
 def _recorder(order: Order) -> Worker:
@@ -145,6 +168,7 @@ def _recorder(order: Order) -> Worker:
 
 _WORKERS: dict[str, Callable[[Order], Worker]] = {
     "emulator": _emulator,
+    "follower": _follower,
     "estimator": _estimator,
     "controller": _controller,
     "recorder": _recorder,

@@ -25,7 +25,10 @@ if TYPE_CHECKING:
 @click.command("replay")
 @click.argument("log", type=click.Path(path_type=Path))
 @click.option("--verify", is_flag=True, help="Compare with what was recorded, bit for bit.")
-@click.option("--estimator", metavar="E", help="Estimator in place of the log's, such as ukf or smoother.")
+@click.option(
+    "--estimator", metavar="E", help="Estimator in place of the log's: ukf, smoother, file.py:factory."
+)
+@click.option("--law", metavar="L", help="Where the log's own law is now, or another one to judge by.")
 @click.option("--leader", metavar="NAME", help="Name of the leader's body.")
 @click.option("--follower", metavar="NAME", help="Name of the follower's body.")
 @click.option("--map", "chart", metavar="FILE", help="Names the topics of a log that is not abreast's.")
@@ -46,6 +49,7 @@ def command(
     log: Path,
     verify: bool,
     estimator: str | None,
+    law: str | None,
     leader: str | None,
     follower: str | None,
     chart: str | None,
@@ -78,15 +82,15 @@ def command(
 
     if from_s is not None and to_s is not None and to_s <= from_s:
         raise UsageError(f"--to {to_s:g}: expected more than --from {from_s:g}")
-    given = read_log(log)
+    given, overrides = _with_sources(read_log(log), estimator, law, overrides)
     if certify:
         overrides = (*overrides, CERTIFY)
-    if chart is None and follower is None and (chain := _chain(given, estimator, leader, overrides, table)):
+    if chart is None and follower is None and (chain := _chain(given, leader, overrides, table)):
         from hil.commands.chain_results import Wishes, replay_run
 
         replay_run(given, chain, Wishes(verify, strict, as_json, from_s, to_s, out))
         return
-    played = _played(given, chart, estimator, leader, follower, overrides, verify=verify)
+    played = _played(given, chart, leader, follower, overrides, verify=verify)
     run_data = run_data_of_replay(given, played, from_s, to_s)
     summary = summarise(run_data)
     if chart is None and (own_motion := judge_own_motion(given, played.scenario)):
@@ -112,10 +116,29 @@ def command(
         raise CheckFailedError(f"log {log}: bounds violated (samples): {counts}")
 
 
+def _with_sources(
+    log: Log, estimator: str | None, law: str | None, overrides: tuple[str, ...]
+) -> tuple[Log, tuple[str, ...]]:
+    """Log with its own law and estimator where they are now, and overrides for others than its own."""
+    from hil.log.description import RECORD
+    from hil.log.metadata import scenario_of
+    from hil.log.own_sources import with_sources
+    from hil.scenario.brought import settled_references
+
+    chosen = settled_references(law, estimator)
+    placed = with_sources(log, chosen, RECORD)
+    own = scenario_of(placed)
+    kept = {} if own is None else {"law": own.controller.law, "estimator": own.estimator.kind}
+    keys = {"law": "controller.law", "estimator": "estimator.kind"}
+    others = [
+        f"{keys[noun]}={text}" for noun, text in chosen.items() if text is not None and text != kept.get(noun)
+    ]
+    return placed, (*overrides, *others)
+
+
 def _played(
     log: Log,
     chart: str | None,
-    estimator: str | None,
     leader: str | None,
     follower: str | None,
     overrides: Sequence[str],
@@ -131,24 +154,23 @@ def _played(
     from hil.scenario.files import with_overrides
     from hil.scenario.links import chain_of, link_of
 
-    kind = [*overrides] if estimator is None else [*overrides, f"estimator.kind={estimator}"]
     if chart is not None:
         if verify:
             raise UsageError("--verify: a log that needs --map has no estimates of ours; leave one out")
-        return replay_foreign(log, load_topic_map(chart, leader, follower, kind))
+        return replay_foreign(log, load_topic_map(chart, leader, follower, overrides))
     own = scenario_of(log)
     if own is None:
-        link = guessed_link(log, leader, follower, kind)
+        link = guessed_link(log, leader, follower, overrides)
         return replay_fed(log, link, why_guessed(link))
     if chain_of(own) is not None and follower is not None:
         _refuse_leader(leader)
-        link, was = link_of(with_overrides(own, kind), follower), link_of(own, follower)
+        link, was = link_of(with_overrides(own, overrides), follower), link_of(own, follower)
         if verify:
             refuse_other_steps(link.scenario, was.scenario)
         return replay_link(log, link, was)
     names = {"leader.name": leader, "follower.name": follower}
     renamed = [f"{key}={name}" for key, name in names.items() if name is not None]
-    chosen = with_overrides(own, [*kind, *renamed])
+    chosen = with_overrides(own, [*overrides, *renamed])
     if verify and not same_steps(chosen, own):
         raise UsageError(
             f"--verify compares with what was recorded: by {own.estimator.kind}, of leader "
@@ -158,9 +180,7 @@ def _played(
     return replay(log, chosen)
 
 
-def _chain(
-    log: Log, estimator: str | None, leader: str | None, overrides: Sequence[str], table: Path | None
-) -> Scenario | None:
+def _chain(log: Log, leader: str | None, overrides: Sequence[str], table: Path | None) -> Scenario | None:
     """Scenario to replay all followers of a chain by; None for the log of a pair, or of others."""
     from hil.log.metadata import scenario_of
     from hil.scenario.files import with_overrides
@@ -176,8 +196,7 @@ def _chain(
             f"--csv {table}: a file holds the estimates of one follower; give --follower with one of "
             f"{known}, or --out for all"
         )
-    kind = [] if estimator is None else [f"estimator.kind={estimator}"]
-    return with_overrides(own, [*overrides, *kind])
+    return with_overrides(own, overrides)
 
 
 def _refuse_leader(leader: str | None) -> None:

@@ -5,14 +5,17 @@ from __future__ import annotations
 import sys
 import time
 from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
 
 from formation.collector import collector_paused
+from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION
 from hil.errors import CheckFailedError, UsageError
+from hil.judge.made_by import law_failure
 from hil.log.report_json import print_json
 from hil.reports.judged_log import claimed, judge_log, made_folder
 from hil.scenario.certify import CERTIFY
@@ -25,8 +28,8 @@ from hil.scenario.schema import Scenario
 @click.argument("scenario", default="turtlebot3")
 @click.option("--duration", type=DURATION, metavar="S", help="Seconds from the leader's start to the stop.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all noise.")
-@click.option("--estimator", metavar="E", help="Estimator, such as ekf, ukf or imm.")
-@click.option("--law", metavar="L", help="Law of the follower.")
+@click.option("--estimator", metavar="E", help="Estimator: ekf, ukf, imm, or file.py:factory.")
+@click.option("--law", metavar="L", help="Law of the follower: independent, or file.py:function.")
 @click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Folder for results."
 )
@@ -34,6 +37,7 @@ from hil.scenario.schema import Scenario
     "--lockstep", is_flag=True, help="On a simulated clock, as fast as it goes; same seed, same bytes."
 )
 @click.option("--listen", metavar="ENDPOINT", help="Where the router listens [a free port on loopback].")
+@click.option("--apart", is_flag=True, help="Estimator and controller as two processes, live.")
 @click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override any key of the scenario."
 )
@@ -50,39 +54,52 @@ def command(
     out: Path | None,
     lockstep: bool,
     listen: str | None,
+    apart: bool,
     overrides: tuple[str, ...],
     certify: bool,
     as_json: bool,
 ) -> None:
     """Drive SCENARIO (a shipped name or a TOML file) through the whole chain, log it and judge it."""
+    if lockstep and apart:
+        raise UsageError("--apart: a run in lockstep is one process; leave one of --apart and --lockstep out")
     given = {"run.duration_s": duration, "run.seed": seed, "estimator.kind": estimator, "controller.law": law}
     options = [f"{key}={value}" for key, value in given.items() if value is not None]
     chosen = load_scenario(scenario, [*overrides, *options, *([CERTIFY] if certify else [])])
     refuse_unrunnable(chosen)
     links_of(chosen)
+    load_own_parts(chosen)
     folder = _folder(chosen, out)
     with claimed(folder):
-        _run(chosen, folder, listen, lockstep=lockstep, as_json=as_json)
+        _run(chosen, folder, None if lockstep else _Live(listen, apart), as_json=as_json)
 
 
-def _run(chosen: Scenario, folder: Path, listen: str | None, *, lockstep: bool, as_json: bool) -> None:
+@dataclass(frozen=True, slots=True)
+class _Live:
+    """How to run live: where the router listens, and whether estimator and controller are two processes."""
+
+    listen: str | None
+    apart: bool
+
+
+def _run(chosen: Scenario, folder: Path, live: _Live | None, *, as_json: bool) -> None:
     log_path = folder / "run.mcap"
     if log_path.exists():
         raise UsageError(f"{log_path} exists already; give another --out, or move it away")
     failure, timing = "", {}
-    if lockstep:
+    if live is None:
         timing = {"lockstep": _lockstep(chosen, log_path)}
     else:
-        failure = _live(chosen, folder, log_path, listen)
+        failure = _live(chosen, log_path, live)
     if not log_path.exists():
         raise CheckFailedError(failure or "interrupted before anything was recorded")
     try:
-        if not lockstep:
+        if live is not None:
             _make_whole(log_path)
         summary = _judge(log_path, folder)
         if as_json:
             # How long it took is no part of the verdict, which is the same for every run of a seed.
             print_json(summary | timing)
+        failure = failure or law_failure(summary)
     finally:
         # Also if there is no room for a verdict, say: what went wrong first is what to tell.
         if failure:
@@ -110,20 +127,20 @@ def _lockstep(scenario: Scenario, log_path: Path) -> dict[str, float]:
     return {"wall_s": took, "times_real_time": times}
 
 
-def _live(scenario: Scenario, folder: Path, log_path: Path, listen: str | None) -> str:
+def _live(scenario: Scenario, log_path: Path, live: _Live) -> str:
     from rich.console import Console
     from rich.text import Text
 
     from hil.live.daemon import Ending
-    from hil.live.run import run_live
+    from hil.live.run import APART, TOGETHER, run_live
     from hil.live.run_monitor import Snapshot
     from hil.wire.session import reserved_endpoint
 
     ending = Ending()
     ending.on_signals()
     console = Console(file=sys.stderr)
-    starting = console.status("starting router, emulator, estimator, controller and recorder")
-    with nullcontext(listen) if listen else reserved_endpoint() as endpoint, starting as status:
+    starting = console.status(f"starting router, {', '.join(APART if live.apart else TOGETHER)}")
+    with nullcontext(live.listen) if live.listen else reserved_endpoint() as endpoint, starting as status:
 
         def show(snapshot: Snapshot, elapsed: float | None) -> None:
             if elapsed is not None:
@@ -131,7 +148,7 @@ def _live(scenario: Scenario, folder: Path, log_path: Path, listen: str | None) 
                 status.update(Text(snapshot.line(elapsed, scenario.run.duration_s)))
 
         try:
-            outcome = run_live(scenario, folder, log_path, endpoint, ending, show)
+            outcome = run_live(scenario, log_path, endpoint, ending, show, apart=live.apart)
         finally:
             ending.leave_signals()
     if outcome.interrupted:

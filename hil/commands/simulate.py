@@ -8,6 +8,7 @@ from typing import Any
 import click
 import msgspec
 
+from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION
 from hil.errors import UsageError
 from hil.log.report_json import known, print_json
@@ -17,7 +18,7 @@ from hil.scenario.schema import Scenario
 
 @click.command("simulate")
 @click.argument("scenario", default="turtlebot3")
-@click.option("--law", help="Law in place of the scenario's.")
+@click.option("--law", help="Law in place of the scenario's, file.py:function too.")
 @click.option("--duration", type=DURATION, help="Seconds to simulate.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for pictures and CSV.")
 @click.option("--stability", is_flag=True, help="Check the propositions of the paper, too; a pair only.")
@@ -41,7 +42,9 @@ def command(
         chosen.append(f"controller.law={law}")
     if duration is not None:
         chosen.append(f"run.duration_s={duration}")
-    result = _simulate(load_scenario(scenario, chosen), out, stability=stability)
+    loaded = load_scenario(scenario, chosen)
+    load_own_parts(loaded, estimates=False)
+    result = _simulate(loaded, out, stability=stability)
     if as_json:
         print_json(result)
         return

@@ -10,8 +10,9 @@ from typing import Any
 
 import click
 
+from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import Seconds
-from hil.errors import UsageError
+from hil.errors import CheckFailedError, UsageError
 from hil.log.report_json import print_json
 from hil.sweep.spec import Sweep, load_sweep
 
@@ -21,7 +22,10 @@ from hil.sweep.spec import Sweep, load_sweep
 @click.option("--runs", type=click.IntRange(min=1), metavar="N", help="Runs of every cell.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all noise.")
 @click.option("--duration", type=Seconds(1.0), metavar="S", help="Seconds of every run.")
-@click.option("--estimators", metavar="A,B", help="Estimators, any that a scenario takes.")
+@click.option(
+    "--estimators", metavar="A,B", help="Estimators, any that a scenario takes, file.py:factory too."
+)
+@click.option("--law", metavar="L", help="Law of the follower, file.py:function too, in all cells.")
 @click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key in all cells."
 )
@@ -48,6 +52,7 @@ def command(
     seed: int | None,
     duration: float | None,
     estimators: str | None,
+    law: str | None,
     overrides: tuple[str, ...],
     workers: int | None,
     scheduler: str | None,
@@ -59,11 +64,16 @@ def command(
 
     Given the same --out again, a sweep that was interrupted goes on. Cells and runs count from 0.
     """
+    from hil.sweep.failed_laws import law_failure
     from hil.sweep.kept_runs import keep_run, worst_runs
     from hil.sweep.results import write_results
 
     names = None if estimators is None else [name.strip() for name in estimators.split(",")]
+    if law is not None:
+        overrides = (*overrides, f"controller.law={law}")
     sweep = load_sweep(spec, overrides, runs=runs, seed=seed, duration_s=duration, estimators=names)
+    for point in sweep.cells()[: len(sweep.spec.estimators)]:
+        load_own_parts(sweep.scenario_of(point))
     to_keep = [_parsed(sweep, text) for text in kept if text != "worst"]
     folder = out or Path("runs") / f"sweep-{time.strftime('%Y%m%d-%H%M%S')}"
     result = _fly(sweep, folder, workers or len(os.sched_getaffinity(0)), scheduler)
@@ -75,6 +85,8 @@ def command(
     click.echo(f"results in {folder}, look at {folder / 'report.html'}", err=True)
     if as_json:
         print_json(result)
+    if reason := law_failure(sweep, result):
+        raise CheckFailedError(reason)
 
 
 def _parsed(sweep: Sweep, text: str) -> tuple[int, int]:

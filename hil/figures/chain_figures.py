@@ -15,6 +15,7 @@ from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
 from controllers.chain import ChainTrajectory
 from formation.angles import FloatArray
+from hil.extensions.reference import short
 from hil.scenario.schema import Scenario
 
 QUIET, LIMIT = "#8a8a8a", "#b03030"
@@ -34,7 +35,7 @@ def draw_chain(scenario: Scenario, trajectory: ChainTrajectory, until: float, pa
     figure = Figure(figsize=(13.5, 7.5), layout="constrained")
     tilt = f", tilt {scenario.controller.tilt:g} rad" if scenario.controller.tilt else ""
     figure.suptitle(
-        f"{scenario.name}: {trajectory.v.shape[1]} agents, {scenario.controller.law} law{tilt}, "
+        f"{scenario.name}: {trajectory.v.shape[1]} agents, {short(scenario.controller.law)} law{tilt}, "
         f"|v| at most {scenario.controller.v_max:g} m/s",
         fontsize=11,
     )

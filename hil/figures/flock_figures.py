@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from controllers.flock import FlockTrajectory
 from formation.angles import FloatArray
+from hil.extensions.reference import short
 from hil.figures.chain_figures import LIMIT, QUIET, Colour, save, share_time_axis
 from hil.scenario.schema import Scenario
 
@@ -35,7 +36,7 @@ def draw_flock(
     agents, most = trajectory.neighbours.shape[1:]
     figure.suptitle(
         f"{scenario.name}: {agents} agents, each follows the mean of its {most} nearest neighbours, "
-        f"{scenario.controller.law} law, |v| at most {scenario.controller.v_max:g} m/s",
+        f"{short(scenario.controller.law)} law, |v| at most {scenario.controller.v_max:g} m/s",
         fontsize=11,
     )
     grid = figure.add_gridspec(4, 2, width_ratios=(1.25, 1.0), height_ratios=(1.7, 1.0, 1.0, 1.0))

@@ -19,6 +19,7 @@ from hil.figures.plot_data import PlotData
 from hil.figures.robot_drawing import draw_pair
 from hil.figures.run_panels import Panel, panels_for
 from hil.judge.columns import inside
+from hil.judge.made_by import made_by
 
 DPI = 96
 _HEIGHT = 8.4
@@ -133,10 +134,8 @@ def _title(summary: Mapping[str, Any]) -> str:
     run = [
         f"{summary['scenario']}",
         f"{summary['mode']}, {summary['duration_s']:.3g} s",
-        summary["estimator"],
+        *made_by(summary),
     ]
-    if "law" in summary:
-        run.append(f"{summary['law']} law")
     if "seed" in summary:
         run.append(f"seed {summary['seed']}")
     return " · ".join(run) + "\n" + " · ".join(_findings(summary))

@@ -17,6 +17,7 @@ from formation.angles import FloatArray
 from formation.closed_loop import Trajectory
 from formation.periodic_orbit import PeriodicOrbit
 from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2
+from hil.extensions.reference import is_reference, short
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 
@@ -221,9 +222,10 @@ def _share_time(rows: list[Axes], trajectory: Trajectory) -> None:
 
 def _figure(scenario: Scenario, trajectory: Trajectory, width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height), layout="constrained")
-    proposition = "Prop. 2" if scenario.controller.law == "independent" else "Prop. 1"
+    law = scenario.controller.law
+    proposition = "of one's own" if is_reference(law) else "Prop. 2" if law == "independent" else "Prop. 1"
     figure.suptitle(
-        f"{scenario.name}: {scenario.controller.law} law ({proposition}), noise-free, {trajectory.t[-1]:g} s",
+        f"{scenario.name}: {short(law)} law ({proposition}), noise-free, {trajectory.t[-1]:g} s",
         fontsize=11,
     )
     return figure

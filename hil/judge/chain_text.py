@@ -15,6 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from hil.judge.certified import certified_violations
+from hil.judge.made_by import made_by
 from hil.judge.summary_text import BAD, GOOD, PLAIN, extended_violations, parity_line, warnings_of
 
 _COLUMNS = ("follower", "rho [m]", "settled", "v1 RMSE", "alpha1", "bounds", "p50, p99")
@@ -39,9 +40,9 @@ def print_chain(summary: Mapping[str, Any], console: Console | None = None) -> N
 
 
 def _head_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
-    made_by = ", ".join([summary["estimator"]] + ([f"{summary['law']} law"] if "law" in summary else []))
+    who = ", ".join(made_by(summary))
     seed = f", seed {summary['seed']}" if "seed" in summary else ""
-    title = f"{summary['scenario']}, {summary['mode']}, {summary['duration_s']:.1f} s ({made_by}{seed})"
+    title = f"{summary['scenario']}, {summary['mode']}, {summary['duration_s']:.1f} s ({who}{seed})"
     yield "run", f"{title}, {summary['agents']} agents", PLAIN
     if "recovered" in summary:
         lost = [pair["follower"] for pair in summary["pairs"] if "settle_s" not in pair]

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from estimation.time.delay_line import Arrival
 from hil.errors import UsageError
+from hil.judge.made_by import law_facts
 from hil.judge.side_orders import Order, orders_of
 from hil.judge.sound_messages import is_sound
 from hil.log.metadata import IMPORT, mode_of, recorded_certificate, scenario_of
@@ -72,7 +73,7 @@ class RunData:
     ``log``: None where they are not known. ``arrivals``: all frames that the estimator could read, as they
     came. ``certified``: estimates with guaranteed radii, where these were asked for. ``certificate``: what
     the log carries for this very scenario, None if it is to be worked out.
-    ``orders``: to change sides, as they were given.
+    ``orders``: to change sides, as they were given. ``law``: what is to be said of a law of one's own.
 
     A replay is judged on the run data of its log with its own estimates and counts put in by
     :func:`dataclasses.replace`.
@@ -96,6 +97,7 @@ class RunData:
     log: LogFacts | None = None
     certificate: Mapping[str, Any] | None = None
     orders: Sequence[Order] = ()
+    law: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,6 +193,7 @@ def run_data_of_link(log: Log, link: Link) -> RunData:
         certified=_decoded(log, records[names.certified], CertifiedEstimate),
         log=LogFacts(str(log.path).encode(errors="replace").decode(), log.messages, log.path.stat().st_size),
         certificate=None if link.first else certificate_json(certificate_of(scenario, driven=False)),
+        law=law_facts(log, counts.get(link.node_name("controller"), {})),
     )
     return replace(run_data, zero_ns=_zero_ns(log, run_data))
 

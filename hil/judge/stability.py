@@ -17,6 +17,7 @@ from formation.spacing import Spacing, lyapunov
 from formation.speed_range import SpeedRange
 from formation.steering_margin import SteeringMargin, steering_margin
 from hil.errors import UsageError
+from hil.extensions.reference import is_reference, short
 from hil.scenario import parts as scenario_parts
 from hil.scenario.schema import Scenario
 
@@ -73,6 +74,11 @@ def stability_of(scenario: Scenario, trajectory: Trajectory) -> Stability:
         raise UsageError(
             f"scenario {scenario.name}: formation.change_sides_at_s is set, but the propositions are about "
             "one side; leave out --stability"
+        )
+    if is_reference(scenario.controller.law):
+        raise UsageError(
+            f"scenario {scenario.name}: controller.law is {short(scenario.controller.law)}, but the "
+            "propositions are about the paper's laws; leave out --stability"
         )
     gains, limits = scenario_parts.gains(scenario), scenario_parts.limits(scenario)
     v1 = scenario_parts.leader_program(scenario)(0.0).v

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hil.extensions.reference import short
 from hil.judge.assumptions import judge_assumptions
 from hil.judge.bounds import judge_bounds
 from hil.judge.certified import judge_certified
@@ -15,6 +16,7 @@ from hil.judge.clock import judge_clock
 from hil.judge.columns import Columns, columns_of
 from hil.judge.estimation import judge_estimation
 from hil.judge.formation import judge_formation
+from hil.judge.made_by import law_json
 from hil.judge.run_data import RunData
 from hil.log.report_json import known
 from hil.scenario.certificate import certificate_json, certificate_of
@@ -32,6 +34,7 @@ def summarise(run_data: RunData) -> dict[str, Any]:
     ``frames.rejected``: inputs that were refused, the robots' odometry included; frames that also held
     strangers do not count. ``commands``: those from when the leader set off to the stop. ``seed`` and ``law``
     are absent for recordings that were not driven by them. ``certified``: only where estimates are certified.
+    ``law``: a name, of one's own more (:func:`hil.judge.made_by.law_json`).
     ``orders_refused``: why the scenario's own orders to change sides were, if they were.
     ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it.
     """
@@ -42,8 +45,8 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "scenario": given.name,
         "seed": given.run.seed if driven else None,
         "mode": run_data.mode,
-        "estimator": given.estimator.kind,
-        "law": given.controller.law if driven or run_data.commands else None,
+        "estimator": short(given.estimator.kind),
+        "law": law_json(given, run_data.law) if driven or run_data.commands else None,
         "duration_s": columns.run.seconds,
         "frames": _frames(run_data),
         "estimation": judge_estimation(run_data, columns),

@@ -11,6 +11,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from hil.judge.made_by import law_failure, made_by
+
 GOOD, BAD, PLAIN = "green", "bold red", ""
 LEAST_COVERAGE = 0.97
 """Of Gaussian errors 99.7 % lie within three standard deviations; below this share they were too small."""
@@ -46,16 +48,15 @@ def warnings_of(summary: Mapping[str, Any]) -> list[str]:
         *_certified_warnings(summary),
         *_formation_warnings(summary),
         *_wire_warnings(summary),
+        *filter(None, [law_failure(summary)]),
     ]
 
 
 def verdict_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     """Name, finding and style (``GOOD``, ``BAD`` or ``PLAIN``) of every line of the verdict."""
-    made_by = ", ".join(
-        [summary["estimator"]] + ([f"{summary['law']} law"] if "law" in summary else []),
-    )
+    who = ", ".join(made_by(summary))
     seed = f", seed {summary['seed']}" if "seed" in summary else ""
-    title = f"{summary['scenario']}, {summary['mode']}, {summary['duration_s']:.1f} s ({made_by}{seed})"
+    title = f"{summary['scenario']}, {summary['mode']}, {summary['duration_s']:.1f} s ({who}{seed})"
     yield "run", title, PLAIN
     yield from _estimate_lines(summary)
     yield from _certified_line(summary)

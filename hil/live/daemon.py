@@ -8,14 +8,12 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from types import FrameType
 from typing import Any, Protocol
 
-from hil.nodes.node import Node, Outgoing, outgoing
-from hil.wire import topics
+from hil.nodes.node import Outgoing
 from hil.wire.events import TICK, Event
-from hil.wire.message_types import String
 from hil.wire.pubsub import Inbox, Wire
 from hil.wire.session import Endpoints, close_session, open_session
 
@@ -37,62 +35,11 @@ class Worker(Protocol):
     def due_ns(self) -> int:
         """When the worker wants to be woken if nothing arrives before."""
 
-    def take(self, event: Event, now_ns: int) -> tuple[Outgoing, ...]:
-        """Deal with an arrival or a tick; what to publish."""
+    def take(self, event: Event, now_ns: int) -> Iterable[Outgoing]:
+        """Deal with an arrival or a tick while whoever publishes walks through what comes of it."""
 
-    def end(self, now_ns: int) -> tuple[Outgoing, ...]:
+    def end(self, now_ns: int) -> Iterable[Outgoing]:
         """Last words."""
-
-
-class NodeWorker:
-    """Carries the states of nodes from step to step: one node, or one for each follower of a chain.
-
-    With ``parting`` the nodes are told to stop before they leave, by the same stop message that all others
-    get: so a controller's last command is a standstill, and the log holds the reason.
-    """
-
-    thorough = False
-
-    def __init__(self, nodes: Sequence[Node[Any]], parting: str = "") -> None:
-        self.nodes = tuple(nodes)
-        self.subscribes = tuple(dict.fromkeys(topic for node in nodes for topic in node.subscribes))
-        self._parting = parting
-        self._states: list[Any] = []
-        self._now_ns = 0
-
-    def begin(self, now_ns: int) -> None:
-        """Let the nodes come up."""
-        self._now_ns = now_ns
-        self._states = [node.begin(now_ns) for node in self.nodes]
-
-    def due_ns(self) -> int:
-        """Time of the next tick of any node."""
-        return min(self._dues())
-
-    def take(self, event: Event, now_ns: int) -> tuple[Outgoing, ...]:
-        """One step of every node that listens to an arrival or, at a tick, is due.
-
-        At a tick after the clock was set back all are: nobody may wait until it is there again.
-        """
-        out: list[Outgoing] = []
-        set_back, self._now_ns = now_ns < self._now_ns, now_ns
-        for place, (node, due_ns) in enumerate(zip(self.nodes, self._dues(), strict=True)):
-            if event.topic in node.subscribes if event.topic else due_ns <= now_ns or set_back:
-                self._states[place], sent = node.step(self._states[place], event, now_ns)
-                out.extend(sent)
-        return tuple(out)
-
-    def end(self, now_ns: int) -> tuple[Outgoing, ...]:
-        """The parting stop, if any, and the nodes' final reports."""
-        out: tuple[Outgoing, ...] = ()
-        if self._parting:
-            stop = outgoing(topics.STOP, String(data=self._parting), now_ns)
-            out = (stop, *self.take(Event(stop.topic, stop.payload), now_ns))
-        reports = (node.report(state, now_ns) for node, state in zip(self.nodes, self._states, strict=True))
-        return (*out, *reports)
-
-    def _dues(self) -> list[int]:
-        return [node.due_ns(state) for node, state in zip(self.nodes, self._states, strict=True)]
 
 
 class Ending:
@@ -179,7 +126,7 @@ def run_daemon(
         close_session(session)
 
 
-def aftermath(inbox: Inbox, worker: Worker) -> Iterator[tuple[Outgoing, ...]]:
+def aftermath(inbox: Inbox, worker: Worker) -> Iterator[Iterable[Outgoing]]:
     """What a thorough worker says to arrivals until none comes for a moment.
 
     Where others go on sending, it ends after half a second.
@@ -213,6 +160,6 @@ def _part(worker: Worker, wire: Wire) -> None:
     time.sleep(_LINGER)
 
 
-def _publish(wire: Wire, messages: tuple[Outgoing, ...]) -> None:
+def _publish(wire: Wire, messages: Iterable[Outgoing]) -> None:
     for message in messages:
         wire.publish(message.topic, message.payload)

@@ -1,6 +1,7 @@
-"""A live run: a router, four daemons as processes, and a supervisor that stops the robots if one fails.
+"""A live run: a router, its daemons as processes, and a supervisor that stops the robots if one fails.
 
-A long chain has more: its controllers share a process, its estimators one for every few of them.
+Followers share a process, and in a long chain there are several of these. With estimators and controllers
+apart, the controllers share one, the estimators one for every few of them.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from hil.live.child_processes import Children
 from hil.live.daemon import Ending
 from hil.live.run_monitor import RunMonitor, Snapshot
 from hil.scenario.files import scenario_text
-from hil.scenario.links import Link, links_of, node_names
+from hil.scenario.links import HOSTED, Link, links_of, node_names
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -27,8 +28,11 @@ from hil.wire.pubsub import Wire
 from hil.wire.session import Endpoints, close_session, open_session
 from hil.wire.topics import link_topics, urgent_topics
 
-DAEMONS = ("recorder", "estimator", "controller", "emulator")
-FOLLOWERS_PER_ESTIMATOR = 4
+TOGETHER = ("recorder", "follower", "emulator")
+APART = ("recorder", "estimator", "controller", "emulator")
+"""The daemons of a run with estimator and controller of a follower in one process, and in two."""
+
+FOLLOWERS_PER_PROCESS = {"follower": 32, "estimator": 4}
 """A process in Python keeps up with that many at 120 frames a second."""
 
 START_TIMEOUT = 60.0
@@ -51,14 +55,16 @@ class Outcome:
 
 
 def run_live(
-    scenario: Scenario, folder: Path, log_path: Path, endpoint: str, ending: Ending, show: Show
+    scenario: Scenario, log_path: Path, endpoint: str, ending: Ending, show: Show, *, apart: bool = False
 ) -> Outcome:
     """Run a scenario live for its duration, or until the end is asked for, or until a daemon fails.
 
-    The router listens on ``endpoint``, where others may connect too.
+    The router listens on ``endpoint``, where others may connect too. ``apart``: estimators and controllers
+    are processes of their own. The scenario as it is run is put beside the log.
     ``show`` gets the snapshot of the run and the time since the leader set off (None before), some 20 times a
     second. However it ends, the robots are stopped, the log is finished and no process is left.
     """
+    folder = log_path.parent
     resolved = folder / "scenario.toml"
     try:
         resolved.write_text(scenario_text(scenario), encoding="utf-8")
@@ -67,7 +73,7 @@ def run_live(
             f"--out {folder}: cannot be written ({error.strerror}); give another folder"
         ) from None
     router = open_session(Endpoints(listen=endpoint))
-    supervisor = _Supervisor(scenario, resolved, folder, log_path, endpoint)
+    supervisor = _Supervisor(scenario, resolved, log_path, endpoint, APART if apart else TOGETHER)
     try:
         return supervisor.run(ending, show)
     finally:
@@ -75,10 +81,10 @@ def run_live(
         close_session(router)
 
 
-def processes_of(links: Sequence[Link]) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+def processes_of(links: Sequence[Link], daemons: Sequence[str]) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     """Name, daemon, and the followers that it serves, of every process of a run; none named means all."""
-    for daemon in DAEMONS:
-        count = math.ceil(len(links) / FOLLOWERS_PER_ESTIMATOR) if daemon == "estimator" else 1
+    for daemon in daemons:
+        count = math.ceil(len(links) / FOLLOWERS_PER_PROCESS.get(daemon, len(links)))
         if count == 1:
             yield daemon, daemon, ()
             continue
@@ -90,27 +96,28 @@ def processes_of(links: Sequence[Link]) -> Iterator[tuple[str, str, tuple[str, .
 
 class _Supervisor:
     def __init__(
-        self, scenario: Scenario, resolved: Path, folder: Path, log_path: Path, endpoint: str
+        self, scenario: Scenario, resolved: Path, log_path: Path, endpoint: str, daemons: Sequence[str]
     ) -> None:
         self._scenario = scenario
         links = links_of(scenario)
         self._pairs = [link_topics(link) for link in links]
-        self._nodes = [name for daemon in DAEMONS for name in node_names(daemon, links)]
+        self._nodes = [name for daemon in daemons for name in node_names(daemon, links)]
         self._session = open_session(Endpoints(connect=endpoint))
         self._wire = Wire(self._session, urgent_topics(scenario))
         self._monitor = RunMonitor(self._session, self._pairs)
-        self._children = Children(folder)
+        self._children = Children(log_path.parent)
         extra = {
             "recorder": ["--out", str(log_path)],
-            "emulator": ["--needs", "estimator,controller,recorder"],
+            "emulator": ["--needs", ",".join(daemon for daemon in daemons if daemon != "emulator")],
         }
-        self._names: dict[str, list[str]] = {daemon: [] for daemon in DAEMONS}
-        for name, daemon, followers in processes_of(links):
+        self._drivers: list[str] = []
+        for name, daemon, followers in processes_of(links, daemons):
             arguments = [str(resolved), "--connect", endpoint, *extra.get(daemon, [])]
             for follower in followers:
                 arguments += ["--follower", follower]
             self._children.start(name, daemon, arguments)
-            self._names[daemon].append(name)
+            if daemon in HOSTED:
+                self._drivers.append(name)
 
     def run(self, ending: Ending, show: Show) -> Outcome:
         begun, known = time.monotonic(), 0
@@ -137,10 +144,10 @@ class _Supervisor:
         return Outcome(failure, ending.asked, driven)
 
     def close(self) -> None:
-        """Controller first, its last word being a standstill; recorder last, so that nothing is missed."""
-        self._children.end([*self._names["controller"], *self._names["estimator"]])
-        self._children.end(self._names["emulator"])
-        self._children.end(self._names["recorder"])
+        """Who drives robots first, its last word being a standstill; recorder last, to miss nothing."""
+        self._children.end(self._drivers)
+        self._children.end(["emulator"])
+        self._children.end(["recorder"])
         self._children.close()
         self._monitor.close()
         self._wire.close()

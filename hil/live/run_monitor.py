@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import threading
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -86,27 +85,29 @@ class Snapshot:
 
 
 class RunMonitor:
-    """Keeps a :class:`Snapshot` up to date from a session's subscriptions."""
+    """Keeps a :class:`Snapshot` up to date from a session's subscriptions.
+
+    Zenoh keeps the newest payload of a topic for us: Python is not called for each one of a long chain's.
+    """
 
     def __init__(self, session: zenoh.Session, pairs: Sequence[Topics]) -> None:
         self.snapshot = Snapshot(tuple(pair.follower for pair in pairs))
-        self._lock = threading.Lock()
-        self._latest: dict[str, bytes] = {}
         self._updated_at = time.monotonic()
-        self._subscribers = [
-            session.declare_subscriber(topics.DIAGNOSTICS, self._on_diagnostics),
-            *(
-                session.declare_subscriber(topic, self._keep)
-                for pair in pairs
-                for topic in (pair.estimate, pair.certified, pair.command, pair.truth)
-            ),
-        ]
+        self._diagnostics = session.declare_subscriber(topics.DIAGNOSTICS, self._on_diagnostics)
+        self._newest = {
+            topic: session.declare_subscriber(topic, zenoh.handlers.RingChannel(1))
+            for pair in pairs
+            for topic in (pair.estimate, pair.certified, pair.command, pair.truth)
+        }
         self._pairs = pairs
 
     def update(self) -> Snapshot:
         """The snapshot as of now. Payloads are decoded here, not in Zenoh's threads."""
-        with self._lock:
-            latest, self._latest = self._latest, {}
+        latest = {
+            topic: sample.payload.to_bytes()
+            for topic, newest in self._newest.items()
+            if (sample := newest.try_recv()) is not None
+        }
         snapshot, now = self.snapshot, time.monotonic()
         snapshot.advance(now - self._updated_at)
         self._updated_at = now
@@ -126,13 +127,10 @@ class RunMonitor:
 
     def close(self) -> None:
         """End the subscriptions."""
-        for subscriber in self._subscribers:
-            subscriber.undeclare()  # type: ignore[no-untyped-call]
-        self._subscribers.clear()
-
-    def _keep(self, sample: zenoh.Sample) -> None:
-        with self._lock:
-            self._latest[str(sample.key_expr)] = sample.payload.to_bytes()
+        self._diagnostics.undeclare()  # type: ignore[no-untyped-call]
+        for newest in self._newest.values():
+            newest.undeclare()  # type: ignore[no-untyped-call]
+        self._newest.clear()
 
     def _on_diagnostics(self, sample: zenoh.Sample) -> None:
         try:

@@ -11,6 +11,7 @@ from hil import __version__
 from hil.errors import UsageError
 from hil.log.description import ORIGIN, RECORD
 from hil.log.older_keys import with_older_keys
+from hil.log.own_sources import source_metadata
 from hil.log.reader import Log
 from hil.log.report_json import as_json
 from hil.scenario.files import build_scenario, scenario_text
@@ -23,15 +24,14 @@ IMPORT = "import"
 
 def log_metadata(scenario: Scenario, mode: str) -> dict[str, dict[str, str]]:
     """Metadata records of a log; ``mode`` is live, lockstep or import."""
-    return {
-        RECORD: {
-            "version": __version__,
-            "mode": mode,
-            "scenario": scenario.name,
-            "seed": str(scenario.run.seed),
-            "scenario_toml": scenario_text(scenario),
-        }
+    record = {
+        "version": __version__,
+        "mode": mode,
+        "scenario": scenario.name,
+        "seed": str(scenario.run.seed),
+        "scenario_toml": scenario_text(scenario),
     }
+    return {RECORD: record} | source_metadata(scenario)
 
 
 def scenario_of(log: Log) -> Scenario | None:

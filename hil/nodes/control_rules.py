@@ -5,7 +5,7 @@ from __future__ import annotations
 from controllers.follower import FollowerSettings
 from controllers.resolution import Resolution
 from hil.nodes.controller_step import ControlRules
-from hil.nodes.leader_turn import SOURCES
+from hil.nodes.leader_turn import source_of
 from hil.scenario.parts import station_keeper, turn_prediction
 from hil.scenario.schema import Scenario
 
@@ -20,7 +20,7 @@ def control_rules(scenario: Scenario) -> ControlRules:
     return ControlRules(
         follower=FollowerSettings(station_keeper(scenario).settings, steps, given.max_age_s),
         turn_prediction=turn_prediction(scenario),
-        turn_source=SOURCES[given.law].value,
+        turn_source=source_of(given.law).value,
         lag=given.lag_s,
         transport_ns=transport_ns,
         ahead_ns=transport_ns + round(given.lag_s / _NS),

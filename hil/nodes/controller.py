@@ -27,8 +27,9 @@ from hil.nodes.controller_entries import control, hear, hear_estimate, refuse
 from hil.nodes.controller_events import NOTHING, STOP, TICK, ControlEvent, Happening, happened
 from hil.nodes.controller_step import ControlState, begun
 from hil.nodes.counting import Count, counts_in
-from hil.nodes.leader_turn import SOURCES, TurnSource
-from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
+from hil.nodes.leader_turn import TurnSource, source_of
+from hil.nodes.node import LAW_FAILURE, Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
+from hil.scenario.brought import law_of
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
@@ -140,8 +141,9 @@ class ControllerNode:
         places = self.decision.numbers_at, self.drive.numbers_at
         self.rules = row_of(NodeRules(control_rules(scenario), *places))
         self.station = station(scenario)
+        self.law = law_of(scenario)
         self.rows = rows_for(scenario.controller.max_age_s + scenario.controller.transport_s)
-        is_told = SOURCES[scenario.controller.law] is TurnSource.TOLD
+        is_told = source_of(scenario.controller.law) is TurnSource.TOLD
         leader = (self.topics.leader_cmd_vel,) if is_told else ()
         self._estimate, self._command = self.topics.estimate, self.topics.command
         self._cmd_vel = self.topics.cmd_vel
@@ -216,6 +218,8 @@ class ControllerNode:
         problem = "" if known.heard else "waiting for estimates"
         values: dict[str, object] = {"estimate": Status(known.status).name.lower()}
         values |= _side_report(known.follower.station)
+        if self.law is not None and (failure := self.law.failure()):
+            values[LAW_FAILURE] = failure
         values |= named_counts("decided", state.decided) | named_counts("refused", state.refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
 

@@ -14,13 +14,15 @@ class TurnSource(IntEnum):
     """Where a law has the leader's turn rate from.
 
     NOWHERE: it knows none. TOLD: what the leader is told to drive. PREDICTED: the estimate, carried on.
-    FADED: this as far as it is worth it.
+    FADED: this as far as it is worth it. OWN: the estimate carried on, for a law that may do with it what it
+    likes; the leader is predicted as for one that knows none.
     """
 
     NOWHERE = 0
     TOLD = 1
     PREDICTED = 2
     FADED = 3
+    OWN = 4
 
 
 SOURCES = {
@@ -29,9 +31,14 @@ SOURCES = {
     "feedforward": TurnSource.PREDICTED,
     "faded": TurnSource.FADED,
 }
-"""Sources by the law's name."""
+"""Sources by the law's name; of any other law it is OWN."""
 
-_PREDICTED, _FADED = TurnSource.PREDICTED.value, TurnSource.FADED.value
+_PREDICTED, _FADED, _OWN = TurnSource.PREDICTED.value, TurnSource.FADED.value, TurnSource.OWN.value
+
+
+def source_of(law: str) -> TurnSource:
+    """Source for a law by its name."""
+    return SOURCES.get(law, TurnSource.OWN)
 
 
 @kernel
@@ -69,7 +76,7 @@ def turn_when_acting(
     source: int, turn_prediction: TurnPrediction, trend: TurnTrend, commanded: float, ahead: float
 ) -> float:
     """Turn rate [rad/s] to give to the law: ``commanded`` where none is predicted; nan without a trend."""
-    if source != _PREDICTED and source != _FADED:
+    if source != _PREDICTED and source != _FADED and source != _OWN:
         return commanded
     if not trend.known:
         return math.nan

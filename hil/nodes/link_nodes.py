@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from formation.pose import STANDSTILL
 from hil.nodes.controller import ControllerNode
+from hil.nodes.node import Outgoing, outgoing
 from hil.scenario.links import Link
+from hil.wire.drive_message import drive_message
+from hil.wire.topics import link_topics
 
 if TYPE_CHECKING:
     from hil.nodes.estimator import EstimatorNode
@@ -22,3 +26,10 @@ def estimator_node(link: Link) -> EstimatorNode:
 def controller_node(link: Link) -> ControllerNode:
     """Controller of a follower; only that of a pair takes orders to change sides."""
     return ControllerNode(link.scenario, link.node_name("controller"), may_change=not link.in_chain)
+
+
+def standstill(link: Link, now_ns: int) -> Outgoing:
+    """What makes a follower's robot stand, without its controller."""
+    pair = link_topics(link)
+    still = drive_message(STANDSTILL, now_ns, pair.follower, stamped=pair.stamped)
+    return outgoing(pair.cmd_vel, still, now_ns)

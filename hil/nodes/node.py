@@ -71,6 +71,10 @@ def counted(counts: Counts, cause: str) -> Counts:
     return {**counts, cause: counts.get(cause, 0) + 1}
 
 
+LAW_FAILURE = "law.failure"
+"""Value of a controller's diagnostics that says why a law of one's own failed."""
+
+
 def named_counts(group: str, counts: Counts) -> dict[str, object]:
     """Counts as values of a diagnostics message, each key ``group.cause``."""
     return {f"{group}.{cause}": count for cause, count in counts.items()}

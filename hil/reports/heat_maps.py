@@ -84,9 +84,20 @@ MERITS = (
 )
 
 
-def slices_of(cells: Sequence[Cell]) -> list[tuple[float, float]]:
-    """Pairs of latency [s] and loss that occur, in order."""
-    return sorted({(float(cell["latency_s"]), float(cell["loss"])) for cell in cells})
+Slice = tuple[float, float, tuple[tuple[str, float], ...]]
+"""Latency [s], loss, and parameters of a law of one's own by name."""
+
+
+def slice_of(cell: Cell) -> Slice:
+    """The slice through the grid that a cell is in."""
+    given = cell.get("parameters", {})
+    swept = tuple((str(name), float(value)) for name, value in given.items())
+    return float(cell["latency_s"]), float(cell["loss"]), swept
+
+
+def slices_of(cells: Sequence[Cell]) -> list[Slice]:
+    """Slices that occur, in order."""
+    return sorted(set(map(slice_of, cells)))
 
 
 def quantities_of(cells: Sequence[Cell]) -> list[str]:
@@ -97,13 +108,15 @@ def quantities_of(cells: Sequence[Cell]) -> list[str]:
 def choices_html(cells: Sequence[Cell]) -> str:
     """The two lists from which quantity and slice are chosen."""
     symbols = {name: f"{QUANTITIES[name][0]} [{QUANTITIES[name][1]}]" for name in quantities_of(cells)}
-    slices = {str(n): slice_name(*each) for n, each in enumerate(slices_of(cells))}
+    slices = {str(n): slice_name(each) for n, each in enumerate(slices_of(cells))}
     return _choice("quantity", "Quantity", symbols) + _choice("slice", "Latency and loss", slices)
 
 
-def slice_name(latency_s: float, loss: float) -> str:
-    """Such as ``30 ms, 5 % lost``."""
-    return f"{1e3 * latency_s:g} ms, {100.0 * loss:g} % lost"
+def slice_name(where: Slice) -> str:
+    """Such as ``30 ms, 5 % lost`` or ``30 ms, 0 % lost, k 0.5``."""
+    latency_s, loss, swept = where
+    parameters = "".join(f", {name} {value:g}" for name, value in swept)
+    return f"{1e3 * latency_s:g} ms, {100.0 * loss:g} % lost{parameters}"
 
 
 def heat_maps(cells: Sequence[Cell], merit: Merit) -> list[Panel]:
@@ -127,8 +140,7 @@ def heat_maps(cells: Sequence[Cell], merit: Merit) -> list[Panel]:
             for n, each in enumerate(slices_of(cells)):
                 looks = [(*_NOTHING, "no such cell")] * len(places)
                 for number, cell in enumerate(cells):
-                    where = (float(cell["latency_s"]), float(cell["loss"]))
-                    if str(cell["estimator"]) == estimator and where == each:
+                    if str(cell["estimator"]) == estimator and slice_of(cell) == each:
                         place = places[float(cell["sigma_position"]), float(cell["sigma_heading"])]
                         looks[place] = _look(cell, number, quantity, merit, scale)
                 for name, values in zip(

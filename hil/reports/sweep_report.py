@@ -10,7 +10,16 @@ from urllib.parse import quote
 
 import numpy as np
 
-from hil.reports.heat_maps import MERITS, SWITCH, Cell, choices_html, heat_maps, slice_name, tightness
+from hil.reports.heat_maps import (
+    MERITS,
+    SWITCH,
+    Cell,
+    choices_html,
+    heat_maps,
+    slice_name,
+    slice_of,
+    tightness,
+)
 from hil.reports.page import Section, page, table_html
 
 _FORMS = ("extended", "sound", "paper")
@@ -145,7 +154,7 @@ def _figures(cell: Cell) -> tuple[str, ...]:
 
 def _name(cell: Cell) -> str:
     noise = f"{1e3 * float(cell['sigma_position']):g} mm, {math.degrees(float(cell['sigma_heading'])):.3g}°"
-    return f"{cell['estimator']}, {noise}, {slice_name(float(cell['latency_s']), float(cell['loss']))}"
+    return f"{cell['estimator']}, {noise}, {slice_name(slice_of(cell))}"
 
 
 def _tightest(cell: Cell) -> float:

@@ -10,6 +10,7 @@ from formation.shape import ABREAST_ALPHA2
 from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
 from formation.station import Side
+from hil.extensions.reference import is_reference, short
 from hil.scenario.noise_bounds import NOISE_SIGMAS, position_bound
 from hil.scenario.schema import Scenario, TableProgram
 
@@ -44,17 +45,30 @@ def assumptions_of(scenario: Scenario, *, driven: bool = True) -> Assumptions:
         noise=f"positions within {NOISE_SIGMAS:g} sigma = {1e3 * eps:.3g} mm ({of_what})",
         side=Side(scenario.formation.side),
         unproved=_unproved(scenario),
+        unknown_steering=_other_law(scenario),
     )
 
 
 def _unproved(scenario: Scenario) -> str:
     """Why nothing is known of the formation that this scenario's follower keeps; empty if something is."""
     law, bearing = scenario.controller, scenario.formation.bearing
+    if other := _other_law(scenario):
+        return other
     if bearing != ABREAST_ALPHA2:
         return f"the set is known abreast only, and formation.bearing is {bearing:g} rad"
     if law.tilt != 0.0:
         return f"the set is known without tilt only, and controller.tilt is {law.tilt:g} rad"
     return ""
+
+
+def _other_law(scenario: Scenario) -> str:
+    """That the law is none of the paper's; empty if it is one."""
+    law = scenario.controller.law
+    return (
+        f"it is known of the paper's laws only, and controller.law is {short(law)}"
+        if is_reference(law)
+        else ""
+    )
 
 
 def _noise(scenario: Scenario) -> tuple[float, str]:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import msgspec
 import tomli_w
 
 from hil.errors import UsageError
+from hil.scenario.brought import refuse_unknown, settle_references
 from hil.scenario.checked_toml import checked, locate, read_toml, shipped_names
 from hil.scenario.links import refuse_chain
 from hil.scenario.schema import OFFLINE_ESTIMATORS, Scenario
@@ -33,6 +35,7 @@ def load_scenario(name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
     tree = read_toml(path, "scenario")
     # A file's name may be none that UTF-8 can write.
     tree.setdefault("name", path.stem.encode(errors="replace").decode())
+    settle_references(tree, path.parent)
     return build_scenario(tree, overrides, source=f"scenario {path.stem}")
 
 
@@ -43,7 +46,10 @@ def build_scenario(
     merged = msgspec.to_builtins(tree)
     for override in overrides:
         _apply(merged, override)
-    return checked(merged, Scenario, source)
+    settle_references(merged, Path.cwd())
+    scenario = checked(merged, Scenario, source)
+    refuse_unknown(scenario, source)
+    return scenario
 
 
 def refuse_unrunnable(scenario: Scenario) -> None:

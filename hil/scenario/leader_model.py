@@ -12,6 +12,8 @@ from estimation.own_motion.odometry_history import InputTrust
 from estimation.own_motion.own_track import ODOMETRY_CORRELATION, TRACK_CORRELATION, OwnNoise
 from estimation.tracking.tracker import TrackSettings
 from hil.errors import UsageError
+from hil.extensions.estimators import own_estimator
+from hil.extensions.reference import is_reference
 from hil.scenario.schema import Scenario
 
 
@@ -38,12 +40,15 @@ def leader_model(scenario: Scenario) -> Model:
 def leader_filter(scenario: Scenario) -> Filter | Estimator:
     """Estimator of a scenario.
 
-    Raises :class:`UsageError` if it is to have states for the sensor's offsets and cannot.
+    Raises :class:`UsageError` if it is to have states for the sensor's offsets and cannot, or if one of one's
+    own cannot be had.
     """
     given, model = scenario.estimator, leader_model(scenario)
+    refuse_bias_states(scenario)
+    if is_reference(given.kind):
+        return own_estimator(given.kind, model)
     if not given.bias_states:
         return make_estimator(given.kind, model, given.difference_cutoff_s)
-    refuse_bias_states(scenario)
     from estimation.filters.bias_filter import BiasedExtended
 
     return BiasedExtended(model, given.sigma_range_bias, given.sigma_bearing_bias)

@@ -13,8 +13,12 @@ from hil.errors import UsageError
 from hil.scenario.schema import ChainSection, Scenario
 from hil.scenario.start import chain_poses
 
-HOSTING = ("estimator", "controller")
-"""The daemons that host a node for every follower."""
+HOSTED = {
+    "estimator": ("estimator",),
+    "controller": ("controller",),
+    "follower": ("estimator", "controller"),
+}
+"""The nodes that a daemon hosts for every follower, where it does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +45,9 @@ class Link:
         """Name of the follower."""
         return self.scenario.follower.name
 
-    def node_name(self, daemon: str) -> str:
-        """What a daemon's node for this follower is called, in a chain such as estimator/agent3."""
-        return f"{daemon}/{self.follower}" if self.in_chain else daemon
+    def node_name(self, node: str) -> str:
+        """What this follower's estimator or controller is called, in a chain such as estimator/agent3."""
+        return f"{node}/{self.follower}" if self.in_chain else node
 
 
 def chain_of(scenario: Scenario) -> ChainSection | None:
@@ -92,7 +96,8 @@ def link_of(scenario: Scenario, follower: str) -> Link:
 
 def node_names(daemon: str, links: Sequence[Link]) -> tuple[str, ...]:
     """Names under which the nodes of a daemon report."""
-    return tuple(link.node_name(daemon) for link in links) if daemon in HOSTING else (daemon,)
+    hosted = HOSTED.get(daemon)
+    return tuple(link.node_name(node) for node in hosted for link in links) if hosted else (daemon,)
 
 
 def refuse_chain(scenario: Scenario, instead: str) -> None:

@@ -6,6 +6,8 @@ one place) is answered here, with a :class:`~hil.errors.UsageError` that names t
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from controllers.laws import Gains
 from controllers.limits import Limits
 from controllers.side_change import gentle
@@ -15,6 +17,7 @@ from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
 from formation.spacing import Spacing
 from formation.station import Side, Station
 from hil.errors import UsageError
+from hil.scenario.brought import law_of
 from hil.scenario.leader_model import process_noise
 from hil.scenario.schema import ConstantProgram, ImpulseProgram, Scenario, SinusoidProgram
 
@@ -41,6 +44,14 @@ def gains(scenario: Scenario) -> Gains:
     return Gains(given.mu1, given.mu2, spacing, station(scenario), given.tilt)
 
 
+def law_gains(scenario: Scenario) -> Gains:
+    """The same with the scenario's own law, if it has one.
+
+    Raises :class:`UsageError` if that cannot be had.
+    """
+    return replace(gains(scenario), own=law_of(scenario))
+
+
 def station(scenario: Scenario) -> Station:
     """Where the follower is to be, seen from either robot."""
     return Station(Side(scenario.formation.side), scenario.formation.bearing)
@@ -52,7 +63,7 @@ def limits(scenario: Scenario) -> Limits:
 
 
 def knows_turn(scenario: Scenario) -> bool:
-    """Whether the scenario's law makes use of the leader's turn rate."""
+    """Whether the scenario's law is told the leader's turn rate."""
     return scenario.controller.law != "independent"
 
 
@@ -64,7 +75,7 @@ def may_change_sides(scenario: Scenario) -> bool:
 def station_keeper(scenario: Scenario) -> StationKeeper:
     """The scenario's law at the follower's station, whichever side that comes to be on."""
     return StationKeeper(
-        gains(scenario),
+        law_gains(scenario),
         limits(scenario),
         knows_turn=knows_turn(scenario),
         may_change=may_change_sides(scenario),

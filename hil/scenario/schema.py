@@ -23,6 +23,8 @@ LawName = Literal["independent", "ideal", "feedforward", "faded"]
 EstimatorName = Literal["ekf", "ukf", "ekf-filterpy", "ukf-filterpy", "imm", "shape-ekf", "mhe", "difference"]
 OfflineName = Literal["smoother"]
 OFFLINE_ESTIMATORS: tuple[OfflineName, ...] = get_args(OfflineName)
+LAW_NAMES: tuple[LawName, ...] = get_args(LawName)
+ESTIMATOR_NAMES: tuple[EstimatorName | OfflineName, ...] = (*get_args(EstimatorName), *OFFLINE_ESTIMATORS)
 FrontEnd = Literal["world", "body"]
 OwnMotion = Literal["odometry", "mocap", "fused"]
 ClockName = Literal["trusted", "estimated"]
@@ -63,13 +65,15 @@ class ControllerSection(_Section, frozen=True, kw_only=True):
     the robot's link, into which commands are rounded so that nothing is lost on average; 0 for a link that
     carries any value. ``command_type``: what the robot takes.
     ``tilt``: how far [rad] a follower that a speed limit holds back may turn off its bearing to close in.
+    A law of one's own is ``file.py:function`` or ``package.module:function``; ``parameters`` are its gains.
     """
 
-    law: LawName = "independent"
+    law: str = "independent"
     mu1: Positive
     mu2: Positive
     mu_rho: Positive
     tilt: Annotated[float, Meta(ge=0.0, lt=1.57)] = 0.0
+    parameters: dict[str, float] | UnsetType = UNSET
     v_max: Positive = 0.22
     u_max: Positive = 2.84
     max_age_s: Positive = 0.2
@@ -216,10 +220,11 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     for those that stop and go every few seconds).
     ``align_odometry``: odometry is corrected by the delay and scales that the follower's mocap track shows.
     ``certify``: publish a guaranteed error radius of v1 and alpha1 beside every estimate.
-    ``kind`` smoother is for replays only.
+    ``kind`` smoother is for replays only; an estimator of one's own is ``file.py:factory`` or
+    ``package.module:factory``.
     """
 
-    kind: EstimatorName | OfflineName = "ekf"
+    kind: str = "ekf"
     front_end: FrontEnd = "world"
     own_motion: OwnMotion = "odometry"
     clock: ClockName = "trusted"

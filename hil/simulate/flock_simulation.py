@@ -69,7 +69,7 @@ def _flown(scenario: Scenario, flock: FlockSection) -> tuple[FloatArray, FlockTr
             scattered(places, Pose(*scenario.leader.pose), flock, scenario.run.seed),
             places,
             scenario_parts.leader_program(scenario),
-            scenario_parts.gains(scenario),
+            scenario_parts.law_gains(scenario),
             scenario_parts.limits(scenario),
             Choice(flock.neighbours, flock.choose_every_s, flock.least_bearing),
             scenario.run.duration_s,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -22,23 +21,23 @@ def report_cell(cell: Cell, tallies: NDArray[np.void], allowed: tuple[float, flo
     RMSE over the root mean square of the posterior Cramer-Rao bound. ``tightness``: the largest of all runs.
     ``formation.deviation``: RMS off the noise-free run. ``formation.certified``: share of moments at which
     the distance was in the certificate's set; absent where it has none. ``worst_run``: the one that came
-    nearest to its extended bounds, among those that diverged if there are any.
+    nearest to its extended bounds, among those that diverged if there are any. ``law_failed``: runs in which
+    a law of one's own failed, absent for none.
     """
     samples = int(tallies["samples"].sum())
     squares, best = _total(tallies["squares"]), _total(tallies["best_sum"])
     best_count, moments = int(tallies["best_count"].sum()), int(tallies["moments"].sum())
     rmse = {name: _root(each, samples) for name, each in zip(QUANTITIES, squares, strict=True)}
     least = {name: _root(each, best_count) for name, each in zip(QUANTITIES, best, strict=True)}
-    point = asdict(cell)
-    point.pop("index")
     result: dict[str, Any] = known(
         {
-            **point,
+            **cell.point(),
             "runs": len(tallies),
             "samples": samples,
             "untracked": int(tallies["untracked"].sum()),
             "diverged": int(tallies["diverged"].sum()),
             "worst_run": _worst(tallies),
+            "law_failed": int(np.count_nonzero(tallies["law_failed"])) or None,
             "rmse": rmse,
             "efficiency": {name: rmse[name] / least[name] for name in rmse if least[name] > 0.0},
             "coverage_3sigma": {

@@ -6,16 +6,18 @@ import hashlib
 import itertools
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Annotated, Any
 
 import msgspec
 import numpy as np
-from msgspec import Meta, Struct
+from msgspec import UNSET, Meta, Struct, UnsetType
 
 from estimation.filters.estimators import ESTIMATORS
 from hil import __version__
 from hil.errors import UsageError
+from hil.extensions.reference import found, is_reference, short
+from hil.scenario.brought import settled_references
 from hil.scenario.checked_toml import checked, locate, read_toml
 from hil.scenario.files import load_scenario, with_overrides
 from hil.scenario.schema import NonNegative, Positive, Probability, Scenario
@@ -28,12 +30,16 @@ LONGEST_S = 3600.0
 
 
 class Grid(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Values of every axis: mocap noise [m], [rad], latency [s] of frames and the share of them lost."""
+    """Values of every axis: mocap noise [m], [rad], latency [s] of frames and the share of them lost.
+
+    ``parameters``: values of each parameter of a law of one's own, if any are to be swept.
+    """
 
     sigma_position: Annotated[tuple[Positive, ...], Meta(min_length=1)]
     sigma_heading: Annotated[tuple[Positive, ...], Meta(min_length=1)]
     latency_s: Annotated[tuple[NonNegative, ...], Meta(min_length=1)] = (0.03,)
     loss: Annotated[tuple[Probability, ...], Meta(min_length=1)] = (0.0,)
+    parameters: dict[str, Annotated[tuple[float, ...], Meta(min_length=1)]] | UnsetType = UNSET
 
 
 class SweepSpec(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -54,13 +60,17 @@ class SweepSpec(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One point of the grid with one estimator. ``index`` counts cells in the order of the results."""
+    """One point of the grid with one estimator. ``index`` counts cells in the order of the results.
+
+    ``parameters``: names and values of the swept parameters of the law.
+    """
 
     index: int
     sigma_position: float
     sigma_heading: float
     latency_s: float
     loss: float
+    parameters: tuple[tuple[str, float], ...]
     estimator: str
 
     def overrides(self) -> list[str]:
@@ -73,7 +83,17 @@ class Cell:
             f"mocap.latency_s={self.latency_s!r}",
             f"mocap.loss={self.loss!r}",
             f"estimator.kind={self.estimator}",
+            *(f"controller.parameters.{name}={value!r}" for name, value in self.parameters),
         ]
+
+    def point(self) -> dict[str, Any]:
+        """Where it is, as the results have it; an estimator of one's own goes without its folders."""
+        point = asdict(self) | {
+            "parameters": dict(self.parameters) or None,
+            "estimator": short(self.estimator),
+        }
+        point.pop("index")
+        return {name: value for name, value in point.items() if value is not None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,18 +108,30 @@ class Sweep:
         grid = self.spec.grid
         axes: tuple[Sequence[Any], ...] = (
             *(grid.sigma_position, grid.sigma_heading, grid.latency_s, grid.loss),
+            self._parameters(),
             self.spec.estimators,
         )
         return [Cell(index, *point) for index, point in enumerate(itertools.product(*axes))]
+
+    def _parameters(self) -> list[tuple[tuple[str, float], ...]]:
+        given = self.spec.grid.parameters
+        swept = {} if isinstance(given, UnsetType) else given
+        axes = [[(name, value) for value in values] for name, values in swept.items()]
+        return list(itertools.product(*axes))
 
     def scenario_of(self, cell: Cell, seed: int = 0) -> Scenario:
         """Scenario of a cell's runs."""
         return with_overrides(self.scenario, [*cell.overrides(), f"run.seed={seed}"])
 
     def digest(self) -> str:
-        """What tells this sweep from any other: a hash of all that its results depend on, our version too."""
+        """What tells this sweep from any other: a hash of all that its results depend on, our version too.
+
+        That is also the source of a law or an estimator of one's own.
+        """
         spec = msgspec.structs.replace(self.spec, description="")
-        identity = msgspec.json.encode([__version__, spec, self.scenario])
+        given = [*spec.estimators, self.scenario.controller.law]
+        sources = [found(text, "sweep").digest() for text in given if is_reference(text)]
+        identity = msgspec.json.encode([__version__, spec, self.scenario, sources])
         return hashlib.sha256(identity).hexdigest()
 
 
@@ -114,17 +146,23 @@ def load_sweep(name_or_path: str, overrides: Sequence[str] = (), **changes: Any)
     tree = read_toml(path, "sweep")
     tree |= {key: value for key, value in changes.items() if value is not None}
     spec = checked(tree, SweepSpec, f"sweep {path.stem}")
-    spec = msgspec.structs.replace(spec, set=(*spec.set, *overrides))
+    estimators = tuple(map(_settled_estimator, spec.estimators))
+    spec = msgspec.structs.replace(spec, set=(*spec.set, *overrides), estimators=estimators)
     for estimator in spec.estimators:
-        if estimator not in ESTIMATORS:
+        if estimator not in ESTIMATORS and not is_reference(estimator):
             raise UsageError(
-                f"sweep {path.stem}: estimators has {estimator!r}, expected some of: {', '.join(ESTIMATORS)}"
+                f"sweep {path.stem}: estimators has {estimator!r}, expected some of: "
+                f"{', '.join(ESTIMATORS)}, or file.py:factory"
             )
     scenario = load_scenario(spec.scenario, [*spec.set, f"run.duration_s={spec.duration_s!r}"])
     sweep = Sweep(spec, scenario)
     for cell in sweep.cells():
         refuse_unsweepable(sweep.scenario_of(cell))
     return sweep
+
+
+def _settled_estimator(text: str) -> str:
+    return settled_references(None, text)["estimator"] or text
 
 
 def run_seed(seed: int, run: int) -> int:

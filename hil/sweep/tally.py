@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from controllers.guard import StopReason
 from estimation.bounds.bound_check import QUANTITY_OF
 from estimation.bounds.error_bounds import Perceived
 from estimation.tracking.estimate import QUANTITIES
@@ -46,6 +47,7 @@ TALLY = np.dtype(
         ("rho_max", _MEASURE),
         ("rho_off_sum", _MEASURE),
         ("alpha1_off_sum", _MEASURE),
+        ("law_failed", _COUNT),
     ]
 )
 """Of one run: sums and extremes over its samples, or over the moments of its truth, in the evaluated time."""
@@ -88,6 +90,7 @@ def judge_run(
     """
     tally = np.zeros(1, TALLY)
     tally["rho_min"], tally["rho_max"] = math.inf, -math.inf
+    tally["law_failed"] = np.count_nonzero(flown.commands["command"]["reason"] == StopReason.NOT_FINITE.code)
     for k, link in enumerate(links_of(scenario)):
         columns = columns_of_pair(link.scenario, flown, k)
         _add_estimates(tally, link.scenario, columns, flown)

@@ -25,11 +25,12 @@ DRIVING_V = 0.03
 
 @dataclass
 class Run:
-    """A run, the folder of its results, and the endpoint that its router listens on."""
+    """A run, the folder of its results, where its router listens, and how many daemons it has."""
 
     folder: Path
     endpoint: str
     process: subprocess.Popen[str]
+    size: int
 
     @property
     def log(self) -> Path:
@@ -59,7 +60,7 @@ class Run:
 
     def wait_until_driving(self, *truths: str) -> None:
         """Wait until leader and follower of every pair drive: ``truths`` are the topics that tell."""
-        self.wait_until(lambda: len(self.daemons()) == 4)
+        self.wait_until(lambda: len(self.daemons()) == self.size)
         driving: set[str] = set()
 
         def look() -> bool:

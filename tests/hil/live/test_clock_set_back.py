@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from hil.emulator.node import EmulatorNode
-from hil.live.daemon import NodeWorker
+from hil.live.node_worker import NodeWorker
 from hil.live.recorder import Recorder
 from hil.lockstep.lockstep import EPOCH_NS
 from hil.log.reader import read_log

@@ -10,17 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from hil.live.daemon import Ending, NodeWorker, aftermath, run_daemon
-from hil.lockstep.run import make_nodes
+from hil.live.daemon import Ending, aftermath, run_daemon
 from hil.log.events import recorded_commands, recorded_estimates
 from hil.log.metadata import scenario_of
 from hil.log.reader import Log, read_log
 from hil.nodes.node import Outgoing, outgoing
 from hil.replay.rerun import replay
-from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
 from hil.wire import topics
-from hil.wire.events import TICK, Event, digest
+from hil.wire.events import Event, digest
 from hil.wire.message_types import String
 from hil.wire.pubsub import Inbox, Wire
 from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
@@ -49,21 +47,22 @@ def endpoint() -> Iterator[str]:
 
 
 @pytest.mark.slow
-def test_daemons_started_by_hand_find_each_other_and_end_when_told(tmp_path: Path, endpoint: str) -> None:
-    daemons = {
-        "recorder": daemon("recorder", tmp_path, "--listen", endpoint, "--out", "lab.mcap"),
-        "estimator": daemon("estimator", tmp_path, "--connect", endpoint),
-        "controller": daemon("controller", tmp_path, "--connect", endpoint),
-    }
+@pytest.mark.parametrize("drivers", [("follower",), ("controller", "estimator")], ids="-".join)
+def test_daemons_started_by_hand_find_each_other_and_end_when_told(
+    tmp_path: Path, endpoint: str, drivers: tuple[str, ...]
+) -> None:
+    daemons = {"recorder": daemon("recorder", tmp_path, "--listen", endpoint, "--out", "lab.mcap")}
+    for name in drivers:
+        daemons[name] = daemon(name, tmp_path, "--connect", endpoint)
     try:
         for name, process in daemons.items():
             wait_until_ready(name, process, endpoint)
         daemons["emulator"] = daemon("emulator", tmp_path, "--connect", endpoint, "--duration", "4")
         wait_until_ready("emulator", daemons["emulator"], endpoint)
         assert daemons["emulator"].wait(PATIENCE) == 0
-        daemons["controller"].terminate()
-        daemons["estimator"].send_signal(2)
-        for name in ("controller", "estimator"):
+        for name, number in zip(drivers, (signal.SIGTERM, signal.SIGINT), strict=False):
+            daemons[name].send_signal(number)
+        for name in drivers:
             assert daemons[name].wait(PATIENCE) == 0
         daemons["recorder"].terminate()
         assert daemons["recorder"].wait(PATIENCE) == 0
@@ -75,7 +74,7 @@ def test_daemons_started_by_hand_find_each_other_and_end_when_told(tmp_path: Pat
     scenario = scenario_of(log)
     assert scenario is not None
     again = replay(log, scenario)
-    assert again.parity["estimates"].compared > 100
+    assert min(again.parity[name].compared for name in ("estimates", "commands")) > 100
     assert again.mismatched == 0 or again.missing_inputs or lost_something(log, scenario)
 
 
@@ -155,30 +154,6 @@ def test_who_is_to_outlive_its_terminal_does() -> None:
         ending.leave_signals()
         signal.signal(signal.SIGHUP, before)
     assert not ending.asked
-
-
-def test_nodes_that_share_a_process_do_what_they_would_do_alone() -> None:
-    emulator, *estimators = make_nodes(load_scenario("chain5-turtlebot3", ["chain.agents=3"]))[:3]
-    together = NodeWorker(estimators)
-    alone = [NodeWorker([node]) for node in estimators]
-    world, now_ns = emulator.begin(0), 0
-    for worker in (together, *alone):
-        worker.begin(0)
-    said = [0, 0]
-    while now_ns < 500_000_000:
-        now_ns = emulator.due_ns(world)
-        world, sent = emulator.step(world, TICK, now_ns)
-        events = [TICK, *(Event(message.topic, message.payload) for message in sent)]
-        for event in events:
-            each = [
-                worker.take(event, now_ns) if event.topic in worker.subscribes or not event.topic else ()
-                for worker in alone
-            ]
-            assert together.take(event, now_ns) == tuple(message for out in each for message in out)
-            said = [count + len(out) for count, out in zip(said, each, strict=True)]
-    assert min(said) > 50
-    assert together.due_ns() == min(worker.due_ns() for worker in alone)
-    assert len(together.end(now_ns)) == 2
 
 
 class Diary:

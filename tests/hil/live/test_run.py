@@ -17,6 +17,7 @@ import pytest
 from formation.pose import Pose
 from hil.emulator.lab_messages import frame_message
 from hil.errors import UsageError
+from hil.live.run import APART, TOGETHER
 from hil.log.reader import read_log
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -46,7 +47,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Run]]:
             text=True,
             start_new_session=True,
         )
-        runs.append(Run(folder, endpoint, process))
+        runs.append(Run(folder, endpoint, process, len(APART if "--apart" in options else TOGETHER)))
         return runs[-1]
 
     with ports:
@@ -76,8 +77,11 @@ def few_frames_lost(summary: dict[str, Any]) -> bool:
     return bool(0 <= frames["lost"] < 0.2 * frames["published"])
 
 
-def test_a_run_estimates_drives_stops_and_leaves_nothing_behind(start: Callable[..., Run]) -> None:
-    run = start("--certify", "--set", "run.evaluate_from_s=2.0")
+@pytest.mark.parametrize("options", [[], ["--apart"]], ids=["together", "apart"])
+def test_a_run_estimates_drives_stops_and_leaves_nothing_behind(
+    start: Callable[..., Run], options: list[str]
+) -> None:
+    run = start(*options, "--certify", "--set", "run.evaluate_from_s=2.0")
     code, summary, err = run.finish()
     assert code == 0, err
     assert run.daemons() == {}
@@ -104,7 +108,7 @@ def test_a_run_estimates_drives_stops_and_leaves_nothing_behind(start: Callable[
 @pytest.mark.slow
 def test_a_killed_estimator_fails_the_run_and_stops_every_follower(start: Callable[..., Run]) -> None:
     followers = ("follower", "agent3")
-    run = start("--set", "chain.agents=3", duration=600.0, scenario="chain5-turtlebot3")
+    run = start("--apart", "--set", "chain.agents=3", duration=600.0, scenario="chain5-turtlebot3")
     run.wait_until_driving(*(f"{name}/truth" for name in followers))
     daemons = run.daemons()
     assert sorted(daemons) == ["controller", "emulator", "estimator", "recorder"]
@@ -126,13 +130,16 @@ def test_a_killed_estimator_fails_the_run_and_stops_every_follower(start: Callab
 
 
 @pytest.mark.slow
-def test_without_a_controller_somebody_else_stops_the_robot(start: Callable[..., Run]) -> None:
-    run = start(duration=600.0)
+@pytest.mark.parametrize(("killed", "options"), [("follower", []), ("controller", ["--apart"])])
+def test_without_a_controller_somebody_else_stops_the_robot(
+    start: Callable[..., Run], killed: str, options: list[str]
+) -> None:
+    run = start(*options, duration=600.0)
     run.wait_until_driving(topics.TRUTH)
-    os.kill(run.daemons()["controller"], signal.SIGKILL)
+    os.kill(run.daemons()[killed], signal.SIGKILL)
     code, _, err = run.finish()
     assert code == 1
-    assert "the controller was killed by signal 9" in err
+    assert f"the {killed} was killed by signal 9" in err
     last = list(read_log(run.log).records(topics=[CMD_VEL]))[-1]
     sent = decode_as(last.payload, msg.TwistStamped).twist
     assert sent.linear.x == sent.angular.z == 0.0
@@ -142,7 +149,7 @@ def test_without_a_controller_somebody_else_stops_the_robot(start: Callable[...,
 
 def test_an_end_that_is_asked_for_while_starting_leaves_no_process(start: Callable[..., Run]) -> None:
     run = start(duration=600.0)
-    run.wait_until(lambda: len(run.daemons()) == 4)
+    run.wait_until(lambda: len(run.daemons()) == run.size)
     run.process.send_signal(signal.SIGTERM)
     _, _, err = run.finish()
     assert "interrupted" in err
