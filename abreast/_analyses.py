@@ -16,6 +16,7 @@ from abreast._logs import LogLike, log_of
 from abreast._scenarios import Own, ScenarioLike, scenario_of, text_of
 from estimation.bounds.certificate import Certificate
 from formation.angles import FloatArray
+from hil.errors import UsageError
 from hil.replay.lab_calibration import Calibration, calibration_of
 from hil.scenario.certificate import certificate_of
 from hil.scenario.files import Overrides, override_texts
@@ -148,6 +149,8 @@ def sweep(
     """
     texts = [*override_texts(overrides), *([] if law is None else [f"controller.law={text_of(law)}"])]
     kinds = None if estimators is None else [text_of(each) for each in estimators]
+    if workers > 1 or scheduler is not None:
+        _refuse_at_hand([text_of(law), *(kinds or [])])
     given = spec if isinstance(spec, Mapping) else os.fspath(spec)
     chosen = load_sweep(given, texts, runs=runs, seed=seed, duration_s=duration_s, estimators=kinds)
     if out is None:
@@ -157,6 +160,16 @@ def sweep(
         result = fly_sweep(chosen, Path(out), workers=workers, scheduler=scheduler, progress=_quiet)
         write_results(chosen, result, Path(out))
     return SweepResult(**result)
+
+
+def _refuse_at_hand(texts: Sequence[str | None]) -> None:
+    """Other processes have nothing of what this program alone has at hand."""
+    for text in texts:
+        if text is not None and text.startswith("program:"):
+            raise UsageError(
+                f"{text.partition(':')[2]} is at hand in this program only; put it into a file for the "
+                "workers to load, or leave workers and scheduler out"
+            )
 
 
 def _quiet(done: int) -> None:

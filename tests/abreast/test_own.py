@@ -100,3 +100,10 @@ def test_a_file_that_was_edited_is_the_new_one(scenario: Scenario, tmp_path: Pat
         (tmp_path / "my_law.py").write_text(LAW.format(share=share), encoding="utf-8")
         ends.append(abreast.simulate(scenario, law=f"{tmp_path / 'my_law.py'}:own").v[-1, 1])
     assert ends[1] == 2.0 * ends[0]
+
+
+def test_workers_are_not_given_what_only_this_program_has() -> None:
+    defined: dict[str, Any] = {}
+    exec(LAW.format(share=1.0), defined)
+    with pytest.raises(abreast.UsageError, match="own is at hand in this program only; put it into a file"):
+        abreast.sweep(law=defined["own"], workers=2)
