@@ -84,6 +84,7 @@ def replay(
         to_s=to_s,
         verify=verify,
         certify=certify,
+        in_messages=True,
     )
     done = replayed(given, choice)
     if verify and (reason := done.why_not_same(given)):

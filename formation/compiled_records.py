@@ -11,10 +11,14 @@ from numba import types
 from numba.core.typing import signature as typing_signature
 from numba.core.typing.templates import AttributeTemplate, Signature, bound_function
 from numba.extending import infer_getattr, lower_builtin, type_callable
+from numba.np.arrayobj import populate_array
 
 from formation import records
 
 _SCALARS: dict[Any, Any] = {float: types.float64, int: types.int64, bool: types.boolean}
+BYTES = types.Bytes(types.uint8, 1, "C", readonly=True)
+"""Type of ``bytes``."""
+
 _BYTE = ir.IntType(8)
 _WORD = ir.IntType(64)
 
@@ -162,6 +166,16 @@ def _bytes_base(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return builder.ptrtoint(context.make_array(kind)(context, builder, value).data, _WORD)
 
 
+def _bytes_at(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    base = _bytes_base(context, builder, signature.args[0], arguments[0])
+    place = builder.inttoptr(builder.add(base, arguments[1]), _BYTE.as_pointer())
+    array = context.make_array(BYTES)(context, builder)
+    one = ir.Constant(_WORD, 1)
+    # Without an owner: who called in keeps the bytes alive.
+    populate_array(array, place, [arguments[2]], [one], one, meminfo=None)
+    return array._getvalue()
+
+
 def _teach_read(function: Any, width: int, result: Any, signed: bool) -> None:
     def read(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         place = builder.add(_bytes_base(context, builder, signature.args[0], arguments[0]), arguments[1])
@@ -191,7 +205,13 @@ def _teach_bytes() -> None:
     _teach_read(records.read_float, 64, types.float64, signed=True)
     _teach_read(records.read_int32, 32, types.int64, signed=True)
     _teach_read(records.read_uint32, 32, types.int64, signed=False)
+    _teach_read(records.read_int64, 64, types.int64, signed=True)
     _teach_read(records.read_byte, 8, types.int64, signed=False)
+    _teach(
+        records.bytes_at,
+        lambda source, at, length: typing_signature(BYTES, source, types.int64, types.int64),
+        _bytes_at,
+    )
     _teach_write(records.write_float, 64, types.float64)
     _teach_write(records.write_int32, 32, types.int64)
     _teach_write(records.write_int64, 64, types.int64)

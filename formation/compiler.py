@@ -20,7 +20,7 @@ from formation import records
 from formation.collector import collector_paused
 from formation.compile_cache import cache_of, one_at_a_time
 from formation.compiled_calls import teach_calls
-from formation.compiled_records import record_type, teach_records
+from formation.compiled_records import BYTES, record_type, teach_records
 from formation.kernel_linking import EntryCompiler, KernelCompiler
 from formation.marked import MARKED, PLAIN, Marked
 
@@ -41,7 +41,7 @@ def type_of(kind: Any) -> Any:
     if kind is type(None):
         return types.none
     if kind is bytes:
-        return types.Bytes(types.uint8, 1, "C", readonly=True)
+        return BYTES
     if get_origin(kind) is records.Rows:
         return types.Array(from_dtype(records.dtype_of(get_args(kind)[0])), 1, "C")
     if array := getattr(kind, "__metadata__", ()):

@@ -217,9 +217,20 @@ def read_uint32(payload: bytes, at: int) -> int:
     return value
 
 
+def read_int64(payload: bytes, at: int) -> int:
+    """Signed 64-bit integer at an offset."""
+    value: int = struct.unpack_from("<q", payload, at)[0]
+    return value
+
+
 def read_byte(payload: bytes, at: int) -> int:
     """Byte at an offset."""
     return payload[at]
+
+
+def bytes_at(source: bytes | Buffer, at: int, length: int) -> bytes:
+    """Some of the bytes; compiled code does not copy them, so that they change with a buffer."""
+    return bytes(source[at : at + length])
 
 
 def write_float(buffer: Buffer, at: int, value: float) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.models.motion import Matrix, Vector
-from formation.angles import FloatArray, wrap
+from formation.angles import wrap
 
 WINDOW = 0.5
 """Length [s] over which motion is averaged: mocap noise is then far below what a driven robot does."""
@@ -73,11 +73,12 @@ def align_odometry(times: Vector, poses: Matrix, odometry_times: Vector, odometr
         return UNKNOWN
     seen = _mean_motion(times, poses, centres)
     delays = np.arange(-LONGEST_DELAY, LONGEST_DELAY + 0.5 * _GRID, _GRID)
-    rests = np.array([_fit(seen, _mean_odometry(odometry_times, odometry, centres - d))[1] for d in delays])
+    ways = _ways(odometry_times, odometry)
+    rests = np.array([_fit(seen, _mean_odometry(odometry_times, ways, centres - d))[1] for d in delays])
     likelihood = -0.5 * independent * np.log(np.maximum(rests, 1e-12)).sum(axis=1)
     best = int(np.argmax(likelihood))
     delay = _peak(delays, likelihood, best)
-    by_odometry = _mean_odometry(odometry_times, odometry, centres - (delay.value if delay else delays[best]))
+    by_odometry = _mean_odometry(odometry_times, ways, centres - (delay.value if delay else delays[best]))
     scales, rest = _fit(seen, by_odometry)
     power = np.mean(by_odometry**2, axis=0)
     sds = np.sqrt(rest / np.maximum(power, 1e-12) / independent)
@@ -122,16 +123,17 @@ def _mean_motion(times: Vector, poses: Matrix, centres: Vector) -> Matrix:
     return np.column_stack([chord / np.sinc(wrap(way[:, 2]) / (2.0 * np.pi)), way[:, 2]]) / WINDOW
 
 
-def _mean_odometry(times: Vector, odometry: Matrix, centres: Vector) -> Matrix:
-    """Mean v and u (k, 2) of odometry, linear between samples, over the windows around the centres."""
+def _ways(times: Vector, odometry: Matrix) -> list[Vector]:
+    """What odometry, linear between samples, adds up to in v and in u since the first one."""
     steps = 0.5 * (odometry[1:] + odometry[:-1]) * np.diff(times)[:, np.newaxis]
-    ways = np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
-    sums = [
-        np.column_stack([np.interp(centres + side, times, column) for column in ways.T])
-        for side in (-0.5 * WINDOW, 0.5 * WINDOW)
-    ]
-    mean: FloatArray = (sums[1] - sums[0]) / WINDOW
-    return mean
+    return [np.concatenate([[0.0], np.cumsum(column)]) for column in steps.T]
+
+
+def _mean_odometry(times: Vector, ways: list[Vector], centres: Vector) -> Matrix:
+    """Mean v and u (k, 2) of odometry that adds up to ``ways``, over the windows around the centres."""
+    begins, ends = (centres + side for side in (-0.5 * WINDOW, 0.5 * WINDOW))
+    sums = [np.interp(ends, times, way) - np.interp(begins, times, way) for way in ways]
+    return np.column_stack(sums) / WINDOW
 
 
 def _covered(times: Vector, centres: Vector, reach: float) -> NDArray[np.bool_]:

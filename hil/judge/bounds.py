@@ -17,7 +17,6 @@ from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 from hil.wire.assumed_errors import AssumedErrors
 
-_ERRORS = ("M_rho", "M_alpha2", "E_rho", "E_alpha2", "E_v2", "E_u2")
 _NEAREST = 1e-6  # m; nobody is nearer, and bounds divide by the distance
 
 
@@ -122,13 +121,14 @@ def assumed_errors(scenario: Scenario, samples: EstimateColumns) -> dict[str, Va
     motion; of inputs three standard deviations.
     """
     assumed = AssumedErrors.of(scenario)
-    nearest = [max(rho, _NEAREST) for rho in np.asarray(samples.seen.rho).tolist()]
-    at_each = [assumed.errors(rho) for rho in nearest]
-    errors: dict[str, Values] = {
-        name: np.array([getattr(each, name) for each in at_each]) for name in _ERRORS
-    }
+    nearest = np.maximum(samples.seen.rho, _NEAREST)
     velocity = assumptions_of(scenario, driven=False).velocity_error
-    return errors | {
+    errors = assumed.errors(1.0)
+    return {
         "M_rho": np.full(len(nearest), velocity + assumed.E_v2),
-        "M_alpha2": velocity / np.array(nearest) + assumed.E_u2,
+        "M_alpha2": velocity / nearest + assumed.E_u2,
+        "E_rho": np.full(len(nearest), errors.E_rho),
+        "E_alpha2": assumed.bearing_errors(nearest),
+        "E_v2": np.full(len(nearest), errors.E_v2),
+        "E_u2": np.full(len(nearest), errors.E_u2),
     }

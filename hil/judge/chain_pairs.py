@@ -11,9 +11,9 @@ import numpy as np
 from controllers.chain import ChainTrajectory
 from formation.angles import FloatArray
 from formation.station import Station
+from hil.judge.columns import command_columns, true_states
 from hil.judge.run_data import RunData, run_span
 from hil.judge.true_states import TrueStates
-from hil.wire.messages import to_ns
 
 _ROUNDING = 1e-6
 
@@ -78,7 +78,7 @@ def driven_trajectory(runs: Sequence[RunData]) -> ChainTrajectory | None:
     where it was told to stand what it drove.
     """
     span = run_span(runs[0])
-    truths = [TrueStates.of(run_data.truth) for run_data in runs]
+    truths = [true_states(run_data) for run_data in runs]
     moments_ns = truths[0].capture_ns
     for each in truths[1:]:
         moments_ns = np.intersect1d(moments_ns, each.capture_ns)
@@ -101,7 +101,7 @@ def driven_trajectory(runs: Sequence[RunData]) -> ChainTrajectory | None:
 
 
 def _wanted(run_data: RunData, states: TrueStates) -> FloatArray:
-    issued_ns = np.array([to_ns(command.header.stamp) for command in run_data.commands], dtype=np.int64)
-    asked = np.array([math.nan, *(command.v2_wanted for command in run_data.commands)])
-    newest = asked[np.searchsorted(issued_ns, states.capture_ns, side="right")]
+    commands = command_columns(run_data)
+    asked = np.concatenate([[math.nan], commands.v2_wanted])
+    newest = asked[np.searchsorted(commands.issued_ns, states.capture_ns, side="right")]
     return np.where(np.isfinite(newest), newest, states.v2)

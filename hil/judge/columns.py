@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import attrgetter
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.bounds.error_bounds import Perceived
+from estimation.tracking.estimate import QUANTITIES
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
 from hil.judge.run_data import RunData, Span, evaluation_span, run_span
 from hil.judge.true_states import Stamps, TrueStates
+from hil.nodes.controller_desk import STOPS
 from hil.wire.message_types import Command, LeaderEstimate
 from hil.wire.messages import to_ns
 
@@ -49,6 +52,18 @@ class EstimateColumns:
             sd=np.sqrt(np.maximum(variances, 0.0)),
         )
 
+    @staticmethod
+    def of_rows(rows: NDArray[np.void]) -> EstimateColumns:
+        """Columns of rows of :class:`hil.replay.kept_rows.EstimateRow`, nothing copied but the deviations."""
+        return EstimateColumns(
+            capture_ns=rows["capture_ns"],
+            status=rows["status"],
+            seen=Perceived(*(rows[name] for name in _SEEN)),
+            u1=rows["u1"],
+            nis=rows["nis"],
+            sd=np.sqrt(np.maximum(np.column_stack([rows[f"var_{name}"] for name in QUANTITIES]), 0.0)),
+        )
+
     def only(self, rows: NDArray[np.bool_]) -> EstimateColumns:
         """The estimates in the given rows."""
         seen = Perceived(*(np.asarray(getattr(self.seen, name))[rows] for name in _SEEN))
@@ -66,6 +81,7 @@ class EstimateColumns:
 class CommandColumns:
     """Commands as arrays of shape (n,): when issued, the capture behind them, what was sent, and flags.
 
+    ``stop``: why the robot is stopped, empty while it drives. ``v2_wanted``: NaN if the law gave none.
     ``fresh``: the first command on a capture; later ones may rest on it as a late frame has changed it.
     """
 
@@ -74,25 +90,70 @@ class CommandColumns:
     v2: FloatArray
     u2: FloatArray
     saturated: NDArray[np.bool_]
+    stop: Sequence[str]
     stopped: NDArray[np.bool_]
     fresh: NDArray[np.bool_]
+    v2_wanted: FloatArray
 
     @staticmethod
     def of(commands: Sequence[Command]) -> CommandColumns:
         """Columns of messages, in their order."""
         capture_ns = np.array([to_ns(c.capture) for c in commands], dtype=np.int64)
-        fresh = np.flatnonzero([c.fresh for c in commands])
-        first = np.zeros(len(commands), dtype=np.bool_)
-        first[fresh[np.unique(capture_ns[fresh], return_index=True)[1]]] = True
+        fresh = np.array([c.fresh for c in commands], dtype=np.bool_)
         return CommandColumns(
             issued_ns=np.array([to_ns(c.header.stamp) for c in commands], dtype=np.int64),
             capture_ns=capture_ns,
             v2=np.array([c.v2 for c in commands], dtype=np.float64),
             u2=np.array([c.u2 for c in commands], dtype=np.float64),
             saturated=np.array([c.saturated for c in commands], dtype=np.bool_),
+            stop=[c.stop for c in commands],
             stopped=np.array([bool(c.stop) for c in commands], dtype=np.bool_),
-            fresh=first,
+            fresh=_first_on_each(capture_ns, fresh),
+            v2_wanted=np.array([c.v2_wanted for c in commands], dtype=np.float64),
         )
+
+    @staticmethod
+    def of_rows(rows: NDArray[np.void]) -> CommandColumns:
+        """Columns of rows of :class:`hil.replay.kept_rows.CommandRow`."""
+        reasons = ("", *STOPS)
+        return CommandColumns(
+            issued_ns=rows["issued_ns"],
+            capture_ns=rows["capture_ns"],
+            v2=rows["v2"],
+            u2=rows["u2"],
+            saturated=rows["saturated"],
+            stop=_Words(rows["stop"], reasons),
+            stopped=rows["stop"] != 0,
+            fresh=_first_on_each(rows["capture_ns"], rows["fresh"]),
+            v2_wanted=rows["v2_wanted"],
+        )
+
+
+class _Words(Sequence[str]):
+    """Texts by their numbers."""
+
+    def __init__(self, numbers: NDArray[np.int64], texts: Sequence[str]) -> None:
+        self._numbers, self._texts = numbers, texts
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    @overload
+    def __getitem__(self, place: int) -> str: ...
+    @overload
+    def __getitem__(self, place: slice) -> Sequence[str]: ...
+    def __getitem__(self, place: int | slice) -> str | Sequence[str]:
+        if isinstance(place, slice):
+            return _Words(self._numbers[place], self._texts)
+        return self._texts[int(self._numbers[place])]
+
+
+def _first_on_each(capture_ns: Stamps, fresh: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which of the fresh commands are the first on their capture."""
+    rows = np.flatnonzero(fresh)
+    first = np.zeros(len(capture_ns), dtype=np.bool_)
+    first[rows[np.unique(capture_ns[rows], return_index=True)[1]]] = True
+    return first
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,18 +172,36 @@ class Columns:
 def columns_of(run_data: RunData) -> Columns:
     """Columns of run data. Samples are the estimates marked TRACKING whose capture lies in the evaluation."""
     run, span = run_span(run_data), evaluation_span(run_data)
-    estimates, truth = EstimateColumns.of(run_data.estimates), TrueStates.of(run_data.truth)
+    estimates, truth = estimate_columns(run_data), true_states(run_data)
     judged = inside(estimates.capture_ns, span)
     samples = estimates.only(judged & (estimates.status == Status.TRACKING))
     return Columns(
         run=run,
         span=span,
         estimates=estimates,
-        commands=CommandColumns.of(run_data.commands),
+        commands=command_columns(run_data),
         truth=truth,
         samples=samples,
         true=truth.at(samples.capture_ns),
     )
+
+
+def estimate_columns(run_data: RunData) -> EstimateColumns:
+    """Columns of a run's estimates."""
+    kept = run_data.kept
+    return EstimateColumns.of(run_data.estimates) if kept is None else EstimateColumns.of_rows(kept.estimates)
+
+
+def command_columns(run_data: RunData) -> CommandColumns:
+    """Columns of a run's commands."""
+    kept = run_data.kept
+    return CommandColumns.of(run_data.commands) if kept is None else CommandColumns.of_rows(kept.commands)
+
+
+def true_states(run_data: RunData) -> TrueStates:
+    """Columns of a run's truth."""
+    kept = run_data.kept
+    return TrueStates.of(run_data.truth) if kept is None else TrueStates.of_rows(kept.truths)
 
 
 def inside(moments_ns: Stamps, span: Span) -> NDArray[np.bool_]:

@@ -2,25 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import compress
 from typing import Any
 
 import click
+import numpy as np
 
 from hil import __version__
 from hil.errors import UsageError
 from hil.judge.certified import certified_violations
-from hil.judge.run_data import RunData, run_data_of_link, run_data_of_log
+from hil.judge.run_data import (
+    RunData,
+    captured,
+    own_certificate,
+    run_data_of_kept,
+    run_data_of_link,
+    run_data_of_log,
+)
 from hil.log.metadata import IMPORT, cut_in_front_s, mode_of, version_of
 from hil.log.reader import Log
+from hil.replay.kept import Array, KeptReplay
 from hil.replay.re_execution import Parity
 from hil.replay.rerun import Replay
 from hil.scenario.certify import same_steps
-from hil.scenario.links import Link
 from hil.scenario.schema import Scenario
 from hil.wire.message_types import LeaderEstimate
 from hil.wire.messages import to_ns
+
+Played = Replay | KeptReplay
+"""A replay of one follower, in messages or in rows."""
 
 _LONG_GAP_S = 0.5
 _CALLED = {"certified": "certified estimates"}
@@ -36,7 +48,7 @@ def refuse_other_steps(chosen: Scenario, own: Scenario) -> None:
 
 
 def run_data_of_replay(
-    log: Log, played: Replay, from_s: float | None = None, to_s: float | None = None
+    log: Log, played: Played, from_s: float | None = None, to_s: float | None = None
 ) -> RunData:
     """Run data of a log with the estimates, commands and counts of its replay in place of the recorded ones.
 
@@ -44,25 +56,20 @@ def run_data_of_replay(
     an emulated leader set off, else from the first capture. Raises :class:`UsageError` if they leave no
     estimate.
     """
-    found = _run_data(log, played.link)
-    captures = [to_ns(estimate.header.stamp) for estimate in played.estimates]
+    found = _run_data(log, played)
+    estimates = captured(found, truth=False)
     zero_ns = found.zero_ns
-    if found.motion_since_ns is None and mode_of(log) != IMPORT:
-        zero_ns = min(captures, default=zero_ns)
+    if found.motion_since_ns is None and mode_of(log) != IMPORT and estimates is not None:
+        zero_ns = estimates.from_ns
     run_data = replace(
         found,
         mode="replay",
-        estimates=played.estimates,
-        commands=played.commands,
-        certified=played.certified,
-        taken=played.estimator.taken,
-        refused=played.estimator.refused,
         zero_ns=zero_ns,
         evaluate_from_ns=None if from_s is None else zero_ns + round(from_s * 1e9),
         evaluate_to_ns=None if to_s is None else zero_ns + round(to_s * 1e9),
     )
-    if captures and not evaluated(run_data):
-        first_s, last_s = ((at - zero_ns) * 1e-9 for at in (min(captures), max(captures)))
+    if estimates is not None and not len(evaluated(run_data)):
+        first_s, last_s = ((at - zero_ns) * 1e-9 for at in (estimates.from_ns, estimates.to_ns))
         raise UsageError(
             f"log {log.path}: no estimate between --from and --to; there are some from {first_s:.3f} s "
             f"to {last_s:.3f} s"
@@ -70,22 +77,43 @@ def run_data_of_replay(
     return run_data
 
 
-def _run_data(log: Log, link: Link) -> RunData:
-    return run_data_of_link(log, link) if link.in_chain else run_data_of_log(log, link.scenario)
+def _run_data(log: Log, played: Played) -> RunData:
+    link = played.link
+    if isinstance(played, KeptReplay):
+        found = run_data_of_kept(log, played)
+        return found if link.in_chain else replace(found, certificate=own_certificate(log, link.scenario))
+    found = run_data_of_link(log, link) if link.in_chain else run_data_of_log(log, link.scenario)
+    return replace(
+        found,
+        estimates=played.estimates,
+        commands=played.commands,
+        certified=played.certified,
+        taken=played.estimator.taken,
+        refused=played.estimator.refused,
+    )
 
 
-def evaluated(run_data: RunData) -> list[LeaderEstimate]:
-    """Estimates within the limits that were asked for, both ends included; all if there are none."""
-    first, last = run_data.evaluate_from_ns, run_data.evaluate_to_ns
-    return [
-        estimate
-        for estimate in run_data.estimates
-        if (first is None or to_ns(estimate.header.stamp) >= first)
-        and (last is None or to_ns(estimate.header.stamp) <= last)
-    ]
+def evaluated(run_data: RunData) -> Sequence[LeaderEstimate] | Array:
+    """Estimates within the limits that were asked for, both ends included; all if there are none.
+
+    Rows of :class:`hil.replay.kept_rows.EstimateRow` where the run data has these.
+    """
+    first, last, kept = run_data.evaluate_from_ns, run_data.evaluate_to_ns, run_data.kept
+    if kept is None:
+        captures_ns = np.array([to_ns(each.header.stamp) for each in run_data.estimates], dtype=np.int64)
+    else:
+        captures_ns = kept.estimates["capture_ns"]
+    there = np.ones(len(captures_ns), dtype=np.bool_)
+    if first is not None:
+        there &= captures_ns >= first
+    if last is not None:
+        there &= captures_ns <= last
+    if kept is not None:
+        return kept.estimates[there]
+    return list(compress(run_data.estimates, there))
 
 
-def parity_json(*played: Replay) -> dict[str, Any]:
+def parity_json(*played: Played) -> dict[str, Any]:
     """Counts of the comparison as the summary has them, over all followers that were replayed."""
     nothing = Parity(0, 0)
     names = ["estimates", "commands"] + ["certified"] * any("certified" in each.parity for each in played)
@@ -99,12 +127,12 @@ def parity_json(*played: Replay) -> dict[str, Any]:
     }
 
 
-def fed_json(played: Replay) -> dict[str, Any]:
+def fed_json(played: Played) -> dict[str, Any]:
     """Part of a summary that says why inputs were fed in log order; empty where they were not."""
     return {"fed": {"why": played.fed}} if played.fed else {}
 
 
-def print_fed(log: Log, *played: Replay) -> None:
+def print_fed(log: Log, *played: Played) -> None:
     """Say on stderr why inputs were fed in log order, a line for every follower for which they were."""
     for each in played:
         if each.fed:
@@ -112,7 +140,7 @@ def print_fed(log: Log, *played: Replay) -> None:
             click.echo(f"log {log.path}: its inputs{whose} are fed in log order: {each.fed}", err=True)
 
 
-def why_not_same(log: Log, played: Replay) -> str:
+def why_not_same(log: Log, played: Played) -> str:
     """What speaks against a replay that repeats the log bit for bit; empty if nothing does."""
     whose = f" of {played.link.follower}" if played.link.in_chain else ""
     if played.fed:

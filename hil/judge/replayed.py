@@ -8,7 +8,9 @@ from typing import Any
 
 from hil.errors import UsageError
 from hil.judge.chain_summary import summarise_chain
+from hil.judge.own_motion import judge_own_motion
 from hil.judge.replay_verdict import (
+    Played,
     fed_json,
     parity_json,
     refuse_other_steps,
@@ -22,13 +24,13 @@ from hil.log.metadata import scenario_of
 from hil.log.own_sources import with_sources
 from hil.log.reader import Log
 from hil.replay.feeding import guessed_link, why_guessed
-from hil.replay.odometry_alignment import judge_own_motion
-from hil.replay.rerun import Replay, replay, replay_chain, replay_fed, replay_foreign, replay_link
+from hil.replay.log_replay import kept_replays
+from hil.replay.rerun import linked, replay_chain, replay_fed, replay_foreign, replay_link
 from hil.replay.topic_map import load_topic_map
 from hil.scenario.brought import settled_references
 from hil.scenario.certify import CERTIFY, same_steps
 from hil.scenario.files import Overrides, with_overrides
-from hil.scenario.links import chain_of, link_of
+from hil.scenario.links import Link, chain_of, link_of
 from hil.scenario.schema import Scenario
 
 _KEYS = {"law": "controller.law", "estimator": "estimator.kind"}
@@ -41,7 +43,8 @@ class ReplayChoice:
     ``estimator``, ``law``: in place of the log's, or where its own are now. ``leader``, ``follower``: names
     of bodies; in a chain ``follower`` is the one to look at, and without it all are. ``chart``: topic map of
     a log that is not ours. ``from_s``, ``to_s`` [s] limit what is judged. ``verify``: whether outputs are
-    compared with the recorded ones. ``certify``: whether certified estimates are made.
+    compared with the recorded ones. ``certify``: whether certified estimates are made. ``in_messages``: not
+    to be done in one pass, which leaves rows, but message by message.
     """
 
     estimator: str | None = None
@@ -54,6 +57,7 @@ class ReplayChoice:
     to_s: float | None = None
     verify: bool = False
     certify: bool = False
+    in_messages: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +69,7 @@ class Replayed:
 
     summary: dict[str, Any]
     runs: tuple[RunData, ...]
-    played: tuple[Replay, ...]
+    played: tuple[Played, ...]
     scenario: Scenario
 
     def why_not_same(self, log: Log) -> str:
@@ -92,7 +96,7 @@ def replayed(log: Log, choice: ReplayChoice) -> Replayed:
     played = _played(log, choice, changes)
     run_data = run_data_of_replay(log, played, choice.from_s, choice.to_s)
     summary = summarise(run_data)
-    if choice.chart is None and (own_motion := judge_own_motion(log, played.scenario)):
+    if choice.chart is None and (own_motion := judge_own_motion(log, played)):
         summary["own_motion"] = own_motion
     if choice.verify:
         summary["parity"] = parity_json(played)
@@ -117,7 +121,8 @@ def _replayed_chain(log: Log, own: Scenario, choice: ReplayChoice, changes: Sequ
     chosen = with_overrides(own, *changes)
     if choice.verify:
         refuse_other_steps(chosen, own)
-    played = replay_chain(log, chosen)
+    kept = None if choice.in_messages else kept_replays(log, linked(log, chosen))
+    played: tuple[Played, ...] = replay_chain(log, chosen) if kept is None else kept
     runs = tuple(run_data_of_replay(log, each, choice.from_s, choice.to_s) for each in played)
     summary = summarise_chain(chosen, runs)
     for pair, each in zip(summary["pairs"], played, strict=True):
@@ -129,7 +134,7 @@ def _replayed_chain(log: Log, own: Scenario, choice: ReplayChoice, changes: Sequ
     return Replayed(summary, runs, played, chosen)
 
 
-def _played(log: Log, choice: ReplayChoice, changes: Sequence[Overrides]) -> Replay:
+def _played(log: Log, choice: ReplayChoice, changes: Sequence[Overrides]) -> Played:
     """Replay of one of our logs, or of another lab's by its topic map."""
     if choice.chart is not None:
         if choice.verify:
@@ -146,7 +151,7 @@ def _played(log: Log, choice: ReplayChoice, changes: Sequence[Overrides]) -> Rep
         was = link_of(own, choice.follower)
         if choice.verify:
             refuse_other_steps(link.scenario, was.scenario)
-        return replay_link(log, link, was)
+        return _in_one_pass(log, link, was, choice)
     names = {"leader.name": choice.leader, "follower.name": choice.follower}
     renamed = {key: name for key, name in names.items() if name is not None}
     chosen = with_overrides(own, *changes, renamed)
@@ -156,7 +161,13 @@ def _played(log: Log, choice: ReplayChoice, changes: Sequence[Overrides]) -> Rep
             f"{own.leader.name!r} and follower {own.follower.name!r}, with the log's own settings; leave out "
             "what changes that"
         )
-    return replay(log, chosen)
+    return _in_one_pass(log, Link(chosen), Link(own), choice)
+
+
+def _in_one_pass(log: Log, link: Link, was: Link, choice: ReplayChoice) -> Played:
+    """Replay of one follower, message by message where it cannot be done in one pass."""
+    kept = None if choice.in_messages else kept_replays(log, [(link, was)])
+    return replay_link(log, link, was) if kept is None else kept[0]
 
 
 def _refuse_leader(leader: str | None) -> None:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import Any, TypeVar
+
+import numpy as np
 
 from estimation.time.delay_line import Arrival
 from hil.errors import UsageError
+from hil.judge.frames import Frames, Numbered, frames_of
 from hil.judge.made_by import law_facts
 from hil.judge.side_orders import Order, orders_of
 from hil.judge.sound_messages import is_sound
 from hil.log.metadata import IMPORT, mode_of, recorded_certificate, scenario_of
 from hil.log.reader import Log, Record
+from hil.replay.kept import Kept, KeptReplay
 from hil.scenario.certificate import certificate_json, certificate_of
 from hil.scenario.certify import same_steps
 from hil.scenario.links import Link
@@ -38,22 +40,6 @@ M = TypeVar("M", bound=Message)
 
 
 @dataclass(frozen=True, slots=True)
-class Frames:
-    """Motion-capture frames: when those that the estimator got were captured [ns], each once, in order.
-
-    ``published``: how many were captured from the first to the last of them.
-    """
-
-    published: int
-    captures_ns: Sequence[int]
-
-    @property
-    def received(self) -> int:
-        """How many the estimator got."""
-        return len(self.captures_ns)
-
-
-@dataclass(frozen=True, slots=True)
 class LogFacts:
     """The log that the run data comes from: its path, its messages, its size."""
 
@@ -73,7 +59,9 @@ class RunData:
     ``log``: None where they are not known. ``arrivals``: all frames that the estimator could read, as they
     came. ``certified``: estimates with guaranteed radii, where these were asked for. ``certificate``: what
     the log carries for this very scenario, None if it is to be worked out.
-    ``orders``: to change sides, as they were given. ``law``: what is to be said of a law of one's own.
+    ``orders``: to change sides, as they were given. ``kept``: what a replay in one pass has kept, in the
+    place of estimates, commands, truth and arrivals, which are empty then. ``law``: what is to be said of a
+    law of one's own.
 
     A replay is judged on the run data of its log with its own estimates and counts put in by
     :func:`dataclasses.replace`.
@@ -97,6 +85,7 @@ class RunData:
     log: LogFacts | None = None
     certificate: Mapping[str, Any] | None = None
     orders: Sequence[Order] = ()
+    kept: Kept | None = None
     law: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -118,11 +107,12 @@ def run_span(run_data: RunData) -> Span:
 
     For a recording in which no emulated leader sets off: from the first to the last of its captures.
     """
-    captures = _captures(run_data)
+    captures = captured(run_data)
     if run_data.motion_since_ns is None:
-        return Span(min(captures, default=run_data.zero_ns), max(captures, default=run_data.zero_ns))
+        return captures or Span(run_data.zero_ns, run_data.zero_ns)
     since_ns = run_data.motion_since_ns
-    ends = [since_ns + round(run_data.scenario.run.duration_s * 1e9), max(captures, default=since_ns)]
+    last_ns = captures.to_ns if captures else since_ns
+    ends = [since_ns + round(run_data.scenario.run.duration_s * 1e9), last_ns]
     if run_data.stopped_ns is not None:
         ends.append(run_data.stopped_ns)
     return Span(since_ns, max(since_ns, min(ends)))
@@ -159,8 +149,14 @@ def run_data_of_log(log: Log, scenario: Scenario | None = None) -> RunData:
     if scenario is None:
         raise UsageError(f"log {log.path}: does not tell its scenario; give one, or a map that names one")
     run_data = run_data_of_link(log, Link(scenario))
+    return replace(run_data, certificate=own_certificate(log, scenario))
+
+
+def own_certificate(log: Log, scenario: Scenario) -> Mapping[str, Any] | None:
+    """The certificate that a log carries for this very scenario, None if it is to be worked out."""
+    own = scenario_of(log)
     same = own is not None and same_steps(scenario, own)
-    return replace(run_data, certificate=recorded_certificate(log) if same else None)
+    return recorded_certificate(log) if same else None
 
 
 def run_data_of_link(log: Log, link: Link) -> RunData:
@@ -191,11 +187,49 @@ def run_data_of_link(log: Log, link: Link) -> RunData:
         arrivals=arrivals,
         orders=() if link.in_chain else orders_of(scenario, _timed(log, records[names.side], String)),
         certified=_decoded(log, records[names.certified], CertifiedEstimate),
-        log=LogFacts(str(log.path).encode(errors="replace").decode(), log.messages, log.path.stat().st_size),
+        log=_facts(log),
         certificate=None if link.first else certificate_json(certificate_of(scenario, driven=False)),
         law=law_facts(log, counts.get(link.node_name("controller"), {})),
     )
     return replace(run_data, zero_ns=_zero_ns(log, run_data))
+
+
+def run_data_of_kept(log: Log, replay: KeptReplay) -> RunData:
+    """Run data of what a replay in one pass has kept of a follower; see :func:`run_data_of_link`."""
+    link, kept = replay.link, replay.kept
+    since = kept.reports.get("emulator", {}).get("motion_since_ns")
+    sides = [_side_of(log, link, each) for each in kept.sides]
+    run_data = RunData(
+        scenario=link.scenario,
+        mode=mode_of(log) or IMPORT,
+        estimates=(),
+        taken=replay.taken,
+        refused=replay.refused,
+        motion_since_ns=int(since) if since and _is_count(since) else None,
+        stopped_ns=kept.stopped_ns,
+        frames=frames_of(
+            link.scenario,
+            Numbered(kept.arrivals["number"], kept.arrivals["capture_ns"]),
+            Numbered(kept.truths["frame_number"], kept.truths["capture_ns"]),
+        ),
+        orders=() if link.in_chain else orders_of(link.scenario, [each for each in sides if each]),
+        log=_facts(log),
+        certificate=None if link.first else certificate_json(certificate_of(link.scenario, driven=False)),
+        law=law_facts(log, kept.reports.get(link.node_name("controller"), {})),
+        kept=kept,
+    )
+    return replace(run_data, zero_ns=_zero_ns(log, run_data))
+
+
+def _side_of(log: Log, link: Link, logged: tuple[int, bytes]) -> tuple[int, String] | None:
+    topic, (log_ns, payload) = link_topics(link).side, logged
+    found = _timed(log, [Record(topic, log.topics.get(topic, ""), payload, log_ns, log_ns, 0)], String)
+    return found[0] if found else None
+
+
+def _facts(log: Log) -> LogFacts:
+    path = str(log.path).encode(errors="replace").decode()
+    return LogFacts(path, log.messages, log.path.stat().st_size)
 
 
 def _zero_ns(log: Log, run_data: RunData) -> int:
@@ -203,12 +237,23 @@ def _zero_ns(log: Log, run_data: RunData) -> int:
         return run_data.motion_since_ns
     if mode_of(log) == IMPORT:
         return 0
-    return min(_captures(run_data), default=log.start_ns or 0)
+    captures = captured(run_data)
+    return captures.from_ns if captures else log.start_ns or 0
 
 
-def _captures(run_data: RunData) -> list[int]:
-    headers = [estimate.header for estimate in run_data.estimates] + [each.header for each in run_data.truth]
-    return [to_ns(header.stamp) for header in headers]
+def captured(run_data: RunData, *, truth: bool = True) -> Span | None:
+    """The first and the last capture that an estimate or, if asked, a truth is about, None without any."""
+    kept = run_data.kept
+    if kept is not None:
+        found = [rows["capture_ns"] for rows in (kept.estimates, kept.truths)[: 1 + truth] if len(rows)]
+        spans = [(int(each.min()), int(each.max())) for each in found]
+    else:
+        headers = [each.header for each in run_data.estimates]
+        headers += [each.header for each in run_data.truth] if truth else []
+        spans = [(at, at) for at in (to_ns(header.stamp) for header in headers)]
+    if not spans:
+        return None
+    return Span(min(first for first, _ in spans), max(last for _, last in spans))
 
 
 def _records(log: Log, names: Topics) -> dict[str, list[Record]]:
@@ -287,25 +332,12 @@ def _arrivals(log: Log, records: Sequence[Record], estimates: Sequence[LeaderEst
 
 
 def _frames(scenario: Scenario, arrivals: Sequence[Arrival], truth: Sequence[Truth]) -> Frames | None:
-    """Frames by their numbers, so that one that came twice counts once; None for fewer than two.
+    arrived = [(each.number, each.capture_ns) for each in arrivals]
+    true = [(each.frame_number, to_ns(each.header.stamp)) for each in truth]
+    found = frames_of(scenario, _numbered(arrived), _numbered(true))
+    return None if found is None else Frames(found.published, np.asarray(found.captures_ns).tolist())
 
-    What was captured is known from the truth of an emulated run, on the host's clock; elsewhere from the
-    numbers themselves, whose commonest step is taken for that of frames in a row.
-    """
-    captured = {each.frame_number: to_ns(each.header.stamp) for each in truth}
-    mocap = scenario.mocap
-    own_clock = any((mocap.clock_offset_s, mocap.clock_drift_ppm, mocap.clock_jump_s))
-    found: dict[int, int] = {}
-    for arrival in arrivals:
-        true_ns = captured.get(arrival.number)
-        if not captured or true_ns == arrival.capture_ns or (own_clock and true_ns is not None):
-            found[arrival.number] = arrival.capture_ns if true_ns is None else true_ns
-    numbers = sorted(found)
-    if len(numbers) < 2:
-        return None
-    if captured:
-        published = sum(numbers[0] <= number <= numbers[-1] for number in captured)
-    else:
-        steps = Counter(after - before for before, after in pairwise(numbers))
-        published = round((numbers[-1] - numbers[0]) / steps.most_common(1)[0][0]) + 1
-    return Frames(published, sorted(found.values()))
+
+def _numbered(captures: Sequence[tuple[int, int]]) -> Numbered:
+    numbers, at_ns = np.array(captures, dtype=np.int64).reshape(-1, 2).T
+    return Numbered(numbers, at_ns)

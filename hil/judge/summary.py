@@ -12,7 +12,7 @@ from hil.extensions.reference import short
 from hil.judge.assumptions import judge_assumptions
 from hil.judge.bounds import judge_bounds
 from hil.judge.certified import judge_certified
-from hil.judge.clock import judge_clock
+from hil.judge.clock import arrival_rows, judge_clock
 from hil.judge.columns import Columns, columns_of
 from hil.judge.estimation import judge_estimation
 from hil.judge.formation import judge_formation
@@ -46,7 +46,7 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "seed": given.run.seed if driven else None,
         "mode": run_data.mode,
         "estimator": short(given.estimator.kind),
-        "law": law_json(given, run_data.law) if driven or run_data.commands else None,
+        "law": law_json(given, run_data.law) if driven or len(columns.commands.issued_ns) else None,
         "duration_s": columns.run.seconds,
         "frames": _frames(run_data),
         "estimation": judge_estimation(run_data, columns),
@@ -55,7 +55,7 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "certificate": run_data.certificate or certificate_json(certificate_of(given, driven=driven)),
         "formation": judge_formation(run_data, columns),
         "latency_ms": _latency(columns),
-        "clock": judge_clock(run_data.arrivals),
+        "clock": judge_clock(arrival_rows(run_data)),
         "commands": _commands(columns),
         "orders_refused": refusal(given) if driven else None,
         "rejected": dict(run_data.refused),

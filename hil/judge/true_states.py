@@ -54,6 +54,13 @@ class TrueStates:
         return _states(moments_ns, _with_shape(recorded[first]))
 
     @staticmethod
+    def of_rows(rows: NDArray[np.void]) -> TrueStates:
+        """Columns of rows of :class:`hil.replay.kept_rows.TruthRow`, the same way."""
+        moments_ns, first = np.unique(rows["capture_ns"], return_index=True)
+        recorded = np.column_stack([rows[name][first] for name in (*_POSES, "v1", "u1", "v2", "u2")])
+        return _states(moments_ns, _with_shape(recorded))
+
+    @staticmethod
     def along(moments_ns: Stamps, recorded: FloatArray) -> TrueStates:
         """Columns of increasing moments: rows (n, 10) of both poses, v1, u1, v2, u2."""
         return _states(moments_ns, _with_shape(recorded))

@@ -40,17 +40,23 @@ def logged_events(log: Log, names: Collection[str]) -> Iterator[Timed]:
     A payload that could not be decoded is kept on a topic of its own when it is logged; here it comes back on
     the topic that it came in on.
     """
+    for topic, payload, log_ns in logged_records(log, names):
+        yield Event(topic, payload), log_ns
+
+
+def logged_records(log: Log, names: Collection[str]) -> Iterator[tuple[str, bytes, int]]:
+    """The same as topic, payload and log time."""
     present = [name for name in (*names, topics.MALFORMED) if name in log.topics]
     for record in log.records(present):
         if record.topic != topics.MALFORMED:
-            yield Event(record.topic, record.payload), record.log_ns
+            yield record.topic, record.payload, record.log_ns
             continue
         try:
             kept = decode_as(record.payload, msg.Malformed)
         except MalformedPayloadError:
             continue
         if kept.topic in names:
-            yield Event(kept.topic, kept.payload.tobytes()), record.log_ns
+            yield kept.topic, kept.payload.tobytes(), record.log_ns
 
 
 def recorded_estimates(log: Log, topic: str) -> list[Recorded]:

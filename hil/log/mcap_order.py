@@ -14,8 +14,10 @@ from typing import BinaryIO, NamedTuple
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Chunk, ChunkIndex
+from mcap.records import Chunk
 from mcap.stream_reader import get_chunk_data_stream
+
+from hil.log.mcap_summary import ChunkPlace
 
 _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
@@ -34,31 +36,34 @@ class Entry(NamedTuple):
 
 
 def entries_in_order(
-    stream: BinaryIO, chunks: Sequence[ChunkIndex], wanted: Callable[[int, int], bool]
+    stream: BinaryIO, chunks: Sequence[ChunkPlace], wanted: Callable[[int, int], bool]
 ) -> Iterator[Entry]:
-    """Yield the messages whose channel id and log time are wanted.
+    """Yield the messages whose channel id and log time are wanted; chunks in the order of their first ones.
 
     Raises what the ``mcap`` package does on bytes that are not as they were written, or ValueError.
     """
-    ordered = sorted(chunks, key=lambda chunk: (chunk.message_start_time, chunk.chunk_start_offset))
     waiting: list[Entry] = []
-    for number, chunk in enumerate(ordered, start=1):
-        waiting.extend(_entries(stream, chunk.chunk_start_offset, wanted))
+    for number, chunk in enumerate(chunks, start=1):
+        waiting.extend(_entries(stream, chunk.offset, wanted))
         waiting.sort()
-        if number < len(ordered):
-            ready = bisect_left(waiting, (ordered[number].message_start_time,))
-        else:
-            ready = len(waiting)
+        following = chunks[number : number + 1]
+        ready = bisect_left(waiting, (following[0].first_ns,)) if following else len(waiting)
         yield from waiting[:ready]
         del waiting[:ready]
 
 
-def _entries(stream: BinaryIO, offset: int, wanted: Callable[[int, int], bool]) -> Iterator[Entry]:
+def chunk_data(stream: BinaryIO, offset: int) -> bytes:
+    """Records of the chunk at an offset of a file; raises as :func:`entries_in_order`."""
     stream.seek(offset + _RECORD.size)
     chunk = Chunk.read(ReadDataStream(stream))
     uncompressed, size = get_chunk_data_stream(chunk, validate_crc=True)
-    data = uncompressed.read(size)
-    at = 0
+    data: bytes = uncompressed.read(size)
+    return data
+
+
+def _entries(stream: BinaryIO, offset: int, wanted: Callable[[int, int], bool]) -> Iterator[Entry]:
+    data = chunk_data(stream, offset)
+    at, size = 0, len(data)
     while at < size:
         opcode, length = _RECORD.unpack_from(data, at)
         at += _RECORD.size

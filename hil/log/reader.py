@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from pathlib import Path
 from typing import BinaryIO
 
 from mcap.exceptions import McapError
-from mcap.reader import NonSeekingReader, SeekingReader
+from mcap.reader import NonSeekingReader
 from mcap.records import Channel, Schema
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
-from mcap.summary import Summary
 from zstandard import ZstdError
 
 from hil.errors import UsageError
 from hil.log.description import SETTLED_NS, described
 from hil.log.mcap_chunks import MAGIC
 from hil.log.mcap_order import entries_in_order
+from hil.log.mcap_summary import ChunkPlace, read_metadata, read_summary
 from hil.wire.message_types import Message
 from hil.wire.messages import decode, typestore_of
 from hil.wire.topics import LOG
@@ -62,7 +62,9 @@ class Log:
 
     ``metadata``: metadata records by name. ``topics``: type name by topic. ``encodings``: message encoding
     by topic. ``definitions``: ``ros2msg`` text by type name, where the log has one. ``messages``: how many
-    there are, from ``start_ns`` to ``end_ns`` in log time (both None in a log without messages).
+    there are, from ``start_ns`` to ``end_ns`` in log time (both None in a log without messages). ``counts``:
+    how many by topic, where the log tells. ``channels``: topic and type name by channel id. ``chunks``: in
+    the order of their first messages, none in a log without an index.
 
     >>> import abreast
     >>> scenario = abreast.load_scenario("turtlebot3", {"run.duration_s": 2.0})
@@ -81,7 +83,9 @@ class Log:
     messages: int
     start_ns: int | None
     end_ns: int | None
-    indexed: bool
+    channels: Mapping[int, tuple[str, str]]
+    chunks: Sequence[ChunkPlace] = field(repr=False)
+    counts: Mapping[str, int] = field(default_factory=dict)
 
     def records(
         self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
@@ -91,21 +95,13 @@ class Log:
         Only those of the given topics (None: all) logged at ``start_ns`` or later and before ``end_ns``.
         Raises :class:`UsageError` if the log is damaged, or if a topic is not encoded as CDR.
         """
-        for topic in self.topics if topics is None else topics:
-            encoding = self.encodings.get(topic, "cdr")
-            if encoding != "cdr":
-                raise UsageError(
-                    f"log {self.path}: topic {topic!r} is encoded as {encoding!r}, expected 'cdr'; "
-                    "convert the log to ROS 2 or leave the topic out"
-                )
+        self.check_encodings(self.topics if topics is None else topics)
         if start_ns is not None and end_ns is not None and end_ns <= start_ns:
             return
-        with _reading(self.path) as stream:
-            summary = SeekingReader(stream, validate_crcs=True).get_summary() if self.indexed else None
-            if summary is not None and summary.chunk_indexes:
-                yield from _indexed(stream, summary, topics, start_ns, end_ns)
+        with reading(self.path) as stream:
+            if self.chunks:
+                yield from _indexed(stream, self, topics, start_ns, end_ns)
                 return
-            stream.seek(0)
             for schema, channel, message in NonSeekingReader(stream, validate_crcs=True).iter_messages(
                 topics=topics, starting_at=start_ns, ending_before=end_ns
             ):
@@ -118,6 +114,16 @@ class Log:
                     message.sequence,
                 )
 
+    def check_encodings(self, topics: Collection[str]) -> None:
+        """Raise :class:`UsageError` if one of the topics is not encoded as CDR."""
+        for topic in topics:
+            encoding = self.encodings.get(topic, "cdr")
+            if encoding != "cdr":
+                raise UsageError(
+                    f"log {self.path}: topic {topic!r} is encoded as {encoding!r}, expected 'cdr'; "
+                    "convert the log to ROS 2 or leave the topic out"
+                )
+
     def decode(self, record: Record) -> Message:
         """Return the record's message, by the log's own definition of its type where it has one.
 
@@ -128,19 +134,13 @@ class Log:
 
 
 def _indexed(
-    stream: BinaryIO,
-    summary: Summary,
-    topics: Collection[str] | None,
-    start_ns: int | None,
-    end_ns: int | None,
+    stream: BinaryIO, log: Log, topics: Collection[str] | None, start_ns: int | None, end_ns: int | None
 ) -> Iterator[Record]:
     first, last = 0 if start_ns is None else start_ns, _END_OF_TIME if end_ns is None else end_ns
     channels = {
-        number: (channel.topic, _typename(summary.schemas[channel.schema_id] if channel.schema_id else None))
-        for number, channel in summary.channels.items()
-        if topics is None or channel.topic in topics
+        number: known for number, known in log.channels.items() if topics is None or known[0] in topics
     }
-    others = summary.channels.keys() - channels.keys()
+    others = log.channels.keys() - channels.keys()
 
     def wanted(channel_id: int, log_ns: int) -> bool:
         if channel_id not in channels and channel_id not in others:
@@ -149,11 +149,8 @@ def _indexed(
 
     chunks = [
         chunk
-        for chunk in summary.chunk_indexes
-        if chunk.message_end_time >= first
-        and chunk.message_start_time < last
-        # Without an index of its own a chunk may hold anything.
-        and not (chunk.message_index_offsets and channels.keys().isdisjoint(chunk.message_index_offsets))
+        for chunk in log.chunks
+        if chunk.last_ns >= first and chunk.first_ns < last and chunk.may_hold(channels)
     ]
     for entry in entries_in_order(stream, chunks, wanted):
         topic, typename = channels[entry.channel_id]
@@ -166,19 +163,24 @@ def read_log(path: Path) -> Log:
     Raises :class:`UsageError` if it is missing, a folder, not MCAP, cut off or damaged.
     """
     check_mcap(path)
-    with _reading(path) as stream:
+    with reading(path) as stream:
         _refuse_cut_off(stream, path)
-        reader = SeekingReader(stream)
-        summary = reader.get_summary()
+        summary = read_summary(stream)
         indexed = bool(summary and summary.statistics and summary.channels and summary.schemas)
         if summary is not None and summary.statistics is not None and indexed:
             schemas, channels = summary.schemas, summary.channels
+            counts = summary.statistics.channel_message_counts
             messages = summary.statistics.message_count
             start_ns, end_ns = summary.statistics.message_start_time, summary.statistics.message_end_time
         else:
             schemas, channels, messages, start_ns, end_ns = _scan(stream)
-        stream.seek(0)
-        metadata = {record.name: dict(record.metadata) for record in SeekingReader(stream).iter_metadata()}
+            counts = {}
+        if summary is not None:
+            records = [read_metadata(stream, index) for index in summary.metadata]
+        else:
+            stream.seek(0)
+            records = list(NonSeekingReader(stream).iter_metadata())
+        metadata = {record.name: dict(record.metadata) for record in records}
         ordered = [channels[number] for number in sorted(channels)]
         log = Log(
             path=path,
@@ -193,7 +195,11 @@ def read_log(path: Path) -> Log:
             messages=messages,
             start_ns=start_ns if messages else None,
             end_ns=end_ns if messages else None,
-            indexed=indexed,
+            channels={
+                channel.id: (channel.topic, _typename(schemas.get(channel.schema_id))) for channel in ordered
+            },
+            chunks=tuple(summary.chunks) if summary is not None and indexed else (),
+            counts=_by_topic(counts, channels),
         )
     return replace(log, metadata={**_told_in_messages(log), **metadata})
 
@@ -206,6 +212,15 @@ def _told_in_messages(log: Log) -> dict[str, dict[str, str]]:
         return {}
     settled = takewhile(lambda record: record.log_ns < first.log_ns + SETTLED_NS, said)
     return described(record.payload for record in (first, *settled))
+
+
+def _by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> dict[str, int]:
+    found: dict[str, int] = {}
+    for number, count in counts.items():
+        if number in channels:
+            topic = channels[number].topic
+            found[topic] = found.get(topic, 0) + count
+    return found
 
 
 def check_mcap(path: Path) -> None:
@@ -230,17 +245,20 @@ def check_mcap(path: Path) -> None:
 
 
 @contextmanager
-def _reading(path: Path) -> Iterator[BinaryIO]:
+def reading(path: Path) -> Iterator[BinaryIO]:
+    """The bytes of a log; raises :class:`UsageError` for what it cannot be read for, damage included."""
     try:
         with path.open("rb") as stream:
             yield stream
     except OSError as error:
         raise UsageError(f"log {path}: cannot be read ({error.strerror or error})") from None
     except DAMAGE as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise UsageError(
-            f"log {path}: is damaged ({reason}); save what is whole with: abreast recover"
-        ) from None
+        raise damaged(path, " ".join(str(error).split()) or type(error).__name__) from None
+
+
+def damaged(path: Path, reason: str) -> UsageError:
+    """The error for a log whose bytes are not as they were written."""
+    return UsageError(f"log {path}: is damaged ({reason}); save what is whole with: abreast recover")
 
 
 def _refuse_cut_off(stream: BinaryIO, path: Path) -> None:

@@ -17,7 +17,7 @@ from estimation.tracking.estimate import Estimate
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE
 from formation.records import load
 from hil.nodes.certifying import Believed, certifying
-from hil.nodes.estimator_entries import RESTARTED, SEEN, SET_BACK, TICK_NS
+from hil.nodes.estimator_inputs import RESTARTED, SEEN, SET_BACK, TICK_NS
 from hil.nodes.estimator_memory import EstimatorMemory, node_rules
 from hil.nodes.frame_time import clock_report
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
@@ -106,6 +106,11 @@ class EstimatorNode:
         }
         self._estimate = self.topics.estimate
         self.subscribes = tuple(self._handlers)
+
+    @property
+    def packed_names(self) -> bytes:
+        """Names of the bodies that are known, as kernels take them."""
+        return self._reader.packed
 
     def begin(self, now_ns: int) -> EstimatorState:
         """State of an estimator that has seen nothing."""

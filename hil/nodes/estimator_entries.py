@@ -1,228 +1,52 @@
 """The estimator's step, compiled: what Python enters once or twice for every message that comes in.
 
 An input is first read and checked, ``see_*``, and then taken into the tracks, ``take``; in between Python
-may look at it. Both work on the node's :class:`hil.nodes.estimator_desk.Desk`, in a row (1,).
+may look at it. Both work on the node's :class:`hil.nodes.estimator_desk.Desk`, in a row (1,), by the kernels
+of :mod:`hil.nodes.estimator_inputs`.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple, cast
 
-from controllers.guard import CLOCK_TOLERANCE_NS
-from estimation.models.measurement import PairSeen, from_sensor, measure_body
-from estimation.own_motion.odometry_history import MotionSample
-from estimation.tracking.track_point import DUPLICATE, GATED, LATE
-from estimation.tracking.tracker import COASTING, LOST, status_of
 from estimation.tracking.tracker import newest as newest_point
-from formation.angles import wrapped
-from formation.kernel import entry, interpreted, kernel
-from formation.pose import Pose
-from formation.records import Rows, load, store
-from hil.nodes import estimator_step as step
-from hil.nodes.counting import count
-from hil.nodes.estimator_desk import Desk, NodeRules, Notes, TimedFrame, forget, forget_tracks, noted
-from hil.nodes.estimator_step import Known, Rules, Taken
-from hil.nodes.frame_time import time_of
-from hil.nodes.refusals import (
-    BAD_RANGE,
-    NO_BODY_FRONT_END,
-    NOT_REFUSED,
-    SAME_PLACE,
-    TAKEN_FRAME,
-    TAKEN_LATE,
-    TAKEN_ODOMETRY,
-    TAKEN_USED,
-    UNKNOWN_BODY,
-    refusal_of,
-)
-from hil.nodes.status_reasons import reason_number
-from hil.wire.estimate_message import estimate_numbers, write_estimate_message
-from hil.wire.frame_layout import read_bodies
-from hil.wire.message_checks import check_frame, check_odometry, check_sighting
-from hil.wire.odometry_layout import read_odometry, read_sighting
-from hil.wire.records import Frame, FrameHead, Sighting, Wanted
-
-SEEN, RESTARTED, SET_BACK = 1, 2, 4
-"""What comes of an input that is seen, added up: it can be used, the clock of the frames has jumped, this
-host's clock was set back. Either of the last two makes what was known before worthless."""
-
-FRAME, SIGHTING, ODOMETRY = range(3)
-"""What can be taken."""
-
-TICK_NS = 50_000_000
-"""How often a node looks whether there is still something to estimate from."""
-
-_SAME_PLACE = 1e-3  # two robots whose centres are this close [m] are one body under two names
-
-
-@kernel
-def _received(desk: Desk, digest: int, now_ns: int) -> int:
-    """Take note of an input; without what is known no more, if the clock was set back."""
-    if noted(desk, digest, now_ns):
-        return 0
-    # All that comes would be too late for what was heard before.
-    forget(desk)
-    return SET_BACK
-
-
-@kernel
-def _read_frame(desk: Desk, payload: bytes, names: bytes, again: bool) -> Frame:
-    if not again:
-        store(desk.heads, 0, read_bodies(payload, names, desk.bodies))
-    return check_frame(load(FrameHead, desk.heads, 0), desk.bodies, load(Wanted, desk.wanted, 0))
-
-
-@kernel(inline=False)
-def _estimated(desk: Desk, reasons: bytes, now_ns: int) -> int:
-    """Put the newest estimate of a track that has one down, and its message into the buffer; its length."""
-    rules, notes = load(NodeRules, desk.rules, 0), load(Notes, desk.notes, 0)
-    newest = step.estimate(load(Known, desk.known, 0), desk.points, rules.step, now_ns)
-    estimate = newest.estimate
-    store(desk.newest, 0, estimate)
-    reason = reason_number(estimate.status, newest.cause)
-    numbers = estimate_numbers(estimate, rules.assumed, reason, notes.receipts, now_ns)
-    store(desk.notes, 0, notes._replace(receipts=0, estimated_ns=now_ns))
-    return write_estimate_message(
-        desk.buffer, rules.times_at, reasons, numbers, estimate.joint, desk.receipts
-    )
-
-
-@kernel
-def _moved_on(desk: Desk, taken: Taken, reasons: bytes, now_ns: int) -> int:
-    """Keep what has become of a measurement, count it, and estimate from it if it was not in vain."""
-    store(desk.known, 0, taken.known)
-    notes, verdict = load(Notes, desk.notes, 0), taken.verdict
-    store(desk.notes, 0, notes._replace(verdict=verdict, cause=taken.cause, late=taken.late))
-    if verdict in (GATED, DUPLICATE, LATE):
-        count(desk.counts, refusal_of(verdict, taken.cause))
-    else:
-        count(desk.counts, TAKEN_USED)
-    if taken.late and verdict != DUPLICATE:
-        count(desk.counts, TAKEN_LATE)
-    return 0 if verdict in (DUPLICATE, LATE) else _estimated(desk, reasons, now_ns)
+from estimation.tracking.tracker import status_of
+from formation.kernel import entry, interpreted
+from formation.records import Rows, load
+from hil.nodes import estimator_inputs as inputs
+from hil.nodes.estimator_desk import Desk, NodeRules
+from hil.nodes.estimator_step import Known
 
 
 @entry
 def see_frame(desks: Rows[Desk], payload: bytes, names: bytes, again: bool, digest: int, now_ns: int) -> int:
     """Read a mocap frame. ``names``: of the bodies, packed; ``again``: it has been read by another node."""
-    desk = load(Desk, desks, 0)
-    came = _received(desk, digest, now_ns)
-    frame = _read_frame(desk, payload, names, again)
-    if frame.cause != NOT_REFUSED:
-        count(desk.counts, frame.cause)
-        return came
-    notes, rules = load(Notes, desk.notes, 0), load(NodeRules, desk.rules, 0)
-    timed = time_of(notes.times, desk.time, rules.time, frame, now_ns)
-    store(desk.notes, 0, notes._replace(times=timed.times))
-    if timed.refusal != NOT_REFUSED:
-        count(desk.counts, timed.refusal)
-        return came
-    if timed.restart:
-        forget_tracks(desk)
-        came += RESTARTED
-    count(desk.counts, TAKEN_FRAME)
-    if frame.strangers > 0:
-        count(desk.counts, UNKNOWN_BODY)
-    dx, dy = frame.leader_x - frame.follower_x, frame.leader_y - frame.follower_y
-    if math.sqrt(dx * dx + dy * dy) < _SAME_PLACE:
-        count(desk.counts, SAME_PLACE)
-        return came
-    follower = Pose(frame.follower_x, frame.follower_y, frame.follower_theta)
-    store(desk.frame, 0, TimedFrame(timed.capture_ns, PairSeen(frame.leader_x, frame.leader_y, follower)))
-    return came + SEEN
+    return inputs.frame_seen(load(Desk, desks, 0), payload, names, again, digest, now_ns)
 
 
 @entry
 def see_odometry(desks: Rows[Desk], payload: bytes, digest: int, now_ns: int) -> int:
     """Read the follower's odometry."""
-    desk = load(Desk, desks, 0)
-    came = _received(desk, digest, now_ns)
-    motion = check_odometry(read_odometry(payload), now_ns + CLOCK_TOLERANCE_NS)
-    if motion.cause != NOT_REFUSED:
-        count(desk.counts, motion.cause)
-        return came
-    store(desk.sample, 0, MotionSample(motion.stamp_ns, motion.v2, motion.u2))
-    count(desk.counts, TAKEN_ODOMETRY)
-    return came + SEEN
+    return inputs.odometry_seen(load(Desk, desks, 0), payload, digest, now_ns)
 
 
 @entry
 def see_sighting(desks: Rows[Desk], payload: bytes, digest: int, now_ns: int) -> int:
     """Read a sighting of the leader, and put it right by what is known of the sensor."""
-    desk = load(Desk, desks, 0)
-    came, sensor = _received(desk, digest, now_ns), load(NodeRules, desk.rules, 0).sensor
-    if not sensor.used:
-        count(desk.counts, NO_BODY_FRONT_END)
-        return came
-    sighting = check_sighting(read_sighting(payload), now_ns + CLOCK_TOLERANCE_NS)
-    if sighting.cause != NOT_REFUSED:
-        count(desk.counts, sighting.cause)
-        return came
-    count(desk.counts, TAKEN_FRAME)
-    rho, alpha2 = sighting.rho - sensor.range_bias, wrapped(sighting.alpha2 - sensor.bearing_bias)
-    if rho <= 0.0:
-        count(desk.counts, BAD_RANGE)
-        return came
-    if sensor.x != 0.0 or sensor.y != 0.0:
-        rho, alpha2 = from_sensor(rho, alpha2, (sensor.x, sensor.y))
-    if rho < _SAME_PLACE:
-        count(desk.counts, SAME_PLACE)
-        return came
-    store(desk.sighting, 0, sighting._replace(rho=rho, alpha2=alpha2))
-    return came + SEEN
-
-
-@kernel
-def _take_frame(desk: Desk, known: Known, rules: Rules) -> Taken:
-    """Take the frame that was seen into the tracks."""
-    frame = load(TimedFrame, desk.frame, 0)
-    return step.take_frame(known, desk.memory(), rules, frame.capture_ns, frame.seen)
-
-
-@kernel
-def _take_sighting(desk: Desk, known: Known, rules: Rules) -> Taken:
-    """Take the sighting that was seen into the leader's track."""
-    memory, sensor = desk.memory(), load(NodeRules, desk.rules, 0).sensor
-    seen = load(Sighting, desk.sighting, 0)
-    motion = step.by_odometry(known, memory, rules, seen.capture_ns)
-    measurement = measure_body(
-        seen.capture_ns, seen.rho, seen.alpha2, sensor.sigma_range, sensor.sigma_bearing, motion
-    )
-    return step.take(known, memory, rules, measurement)
+    return inputs.sighting_seen(load(Desk, desks, 0), payload, digest, now_ns)
 
 
 @entry
 def take(desks: Rows[Desk], what: int, reasons: bytes, now_ns: int) -> int:
-    """Take what was seen into the tracks; the length of the estimate's message, 0 for none.
-
-    ``what``: FRAME, SIGHTING, or ODOMETRY, which folds again what came after the sample before it. One entry
-    for all three, so that the filter is compiled into it once.
-    """
-    desk = load(Desk, desks, 0)
-    known, rules = load(Known, desk.known, 0), load(NodeRules, desk.rules, 0).step
-    if what == ODOMETRY:
-        sample = load(MotionSample, desk.sample, 0)
-        store(desk.known, 0, step.take_odometry(known, desk.memory(), rules, sample))
-        return 0
-    if what == FRAME:
-        return _moved_on(desk, _take_frame(desk, known, rules), reasons, now_ns)
-    return _moved_on(desk, _take_sighting(desk, known, rules), reasons, now_ns)
+    """Take what was seen into the tracks; the length of the estimate's message, 0 for none."""
+    return inputs.taken(load(Desk, desks, 0), what, reasons, now_ns)
 
 
 @entry
 def tick(desks: Rows[Desk], reasons: bytes, now_ns: int) -> int:
     """Speak up if measurements are missing; the length of the message, 0 for none."""
-    desk = load(Desk, desks, 0)
-    known = load(Known, desk.known, 0)
-    if known.track.length == 0:
-        return 0
-    settings = load(NodeRules, desk.rules, 0).step.settings
-    found = status_of(newest_point(desk.points, known.track), now_ns, settings)
-    missing = found in (COASTING, LOST)
-    due = (now_ns - load(Notes, desk.notes, 0).estimated_ns) * 2 > TICK_NS
-    return _estimated(desk, reasons, now_ns) if missing and due else 0
+    return inputs.ticked(load(Desk, desks, 0), reasons, now_ns)
 
 
 @entry

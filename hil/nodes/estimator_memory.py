@@ -23,7 +23,7 @@ from formation.kernel import compiles
 from formation.lending import lent
 from formation.records import R, Rows, columns_of, load, plain_rows_of, row_of, rows_of, store
 from formation.ring import Ring, place
-from hil.nodes import estimator_entries as entries
+from hil.nodes import estimator_inputs as inputs
 from hil.nodes.counting import Count, counts_in
 from hil.nodes.estimator_desk import (
     NOTHING_KNOWN,
@@ -170,15 +170,15 @@ class EstimatorMemory:
 
     def take_frame(self, now_ns: int) -> int:
         """Take in the frame that was seen."""
-        return self._steps.take(self._lent, entries.FRAME, _REASONS, now_ns)
+        return self._steps.take(self._lent, inputs.FRAME, _REASONS, now_ns)
 
     def take_sighting(self, now_ns: int) -> int:
         """Take in the sighting that was seen."""
-        return self._steps.take(self._lent, entries.SIGHTING, _REASONS, now_ns)
+        return self._steps.take(self._lent, inputs.SIGHTING, _REASONS, now_ns)
 
     def take_odometry(self) -> None:
         """Take in the odometry that was seen."""
-        self._steps.take(self._lent, entries.ODOMETRY, _REASONS, 0)
+        self._steps.take(self._lent, inputs.ODOMETRY, _REASONS, 0)
 
     def tick(self, now_ns: int) -> int:
         """Estimate if no measurement has led to that for a while."""

@@ -7,11 +7,16 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
+
 from estimation.tracking.estimate import QUANTITIES
 from estimation.tracking.tracker import Status
 from hil.errors import UsageError
+from hil.replay.kept import Array
+from hil.replay.kept_rows import EstimateRow, estimate_row
+from hil.wire.estimate_layout import read_estimate
 from hil.wire.message_types import LeaderEstimate
-from hil.wire.messages import to_ns
+from hil.wire.messages import encode
 
 FIELDS = (
     "t",
@@ -25,31 +30,43 @@ FIELDS = (
 )
 
 
-def write_estimates(estimates: Iterable[LeaderEstimate], path: Path) -> None:
+def write_estimates(estimates: Iterable[LeaderEstimate] | Array, path: Path) -> None:
     """Write estimates in their order, numbers to full precision; what is not known is left empty.
 
-    ``t`` is the capture time [s], exact to the nanosecond; ``sd_`` are standard deviations. Raises
-    :class:`UsageError` if the file cannot be written.
+    ``estimates``: messages, or rows of :class:`hil.replay.kept_rows.EstimateRow`. ``t`` is the capture time
+    [s], exact to the nanosecond; ``sd_`` are standard deviations. Raises :class:`UsageError` if the file
+    cannot be written.
     """
+    rows: Iterable[EstimateRow]
+    if isinstance(estimates, np.ndarray):
+        rows = (EstimateRow._make(row.item()) for row in estimates)
+    else:
+        rows = map(_row_of, estimates)
     try:
         with path.open("w", encoding="utf-8", newline="") as stream:
             writer = csv.writer(stream, lineterminator="\n")
             writer.writerow(FIELDS)
-            writer.writerows(_row(estimate) for estimate in estimates)
+            writer.writerows(map(_cells, rows))
     except OSError as error:
         raise UsageError(f"{path}: cannot be written ({error.strerror}); give another place") from None
 
 
-def _row(estimate: LeaderEstimate) -> list[str]:
-    variances = estimate.covariance.reshape(5, 5).diagonal().tolist()
+def _row_of(message: LeaderEstimate) -> EstimateRow:
+    payload = encode(message)
+    read = read_estimate(payload)
+    return estimate_row(read.numbers, payload, read.covariance_at)
+
+
+def _cells(row: EstimateRow) -> list[str]:
+    variances = [getattr(row, f"var_{name}") for name in QUANTITIES]
     numbers = [
-        estimate.rho,
-        estimate.alpha2,
-        *(getattr(estimate, name) for name in QUANTITIES),
+        row.rho,
+        row.alpha2,
+        *(getattr(row, name) for name in QUANTITIES),
         *(math.sqrt(variance) if variance >= 0.0 else math.nan for variance in variances),
-        estimate.bound_v1,
-        estimate.bound_alpha1,
+        row.bound_v1,
+        row.bound_alpha1,
     ]
-    seconds, rest = divmod(to_ns(estimate.header.stamp), 1_000_000_000)
+    seconds, rest = divmod(row.capture_ns, 1_000_000_000)
     texts = ["" if math.isnan(number) else repr(float(number)) for number in numbers]
-    return [f"{seconds}.{rest:09d}", *texts, Status(estimate.status).name.lower()]
+    return [f"{seconds}.{rest:09d}", *texts, Status(row.status).name.lower()]

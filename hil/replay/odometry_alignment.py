@@ -6,17 +6,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.own_motion.input_alignment import UNKNOWN, Alignment, align_odometry
 from estimation.time.host_time import NO_TIME_YET, time_rows
+from formation.angles import FloatArray
 from formation.records import plain_rows_of
 from hil.log.reader import Log
 from hil.nodes.frame_time import time_of, time_rules
 from hil.nodes.refusals import NOT_REFUSED
+from hil.replay.kept import Kept
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.reading import RefusedError, read_frame, read_odometry
 from hil.wire.topics import topics_of
+
+Stamps = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,16 +60,34 @@ def own_record(log: Log, scenario: Scenario) -> OwnRecord:
 
 def own_alignment(record: OwnRecord) -> Alignment:
     """Delay and scales of the odometry against the poses."""
-    if not (record.poses and record.motions):
-        return UNKNOWN
-    zero_ns = min((*record.poses, *record.motions))
     seen_ns, odometry_ns = sorted(record.poses), sorted(record.motions)
-    return align_odometry(
-        np.array([(at_ns - zero_ns) * 1e-9 for at_ns in seen_ns]),
+    return _aligned(
+        np.array(seen_ns, dtype=np.int64),
         np.array([record.poses[at_ns] for at_ns in seen_ns]),
-        np.array([(at_ns - zero_ns) * 1e-9 for at_ns in odometry_ns]),
+        np.array(odometry_ns, dtype=np.int64),
         np.array([record.motions[at_ns] for at_ns in odometry_ns]),
     )
+
+
+def _aligned(seen_ns: Stamps, poses: FloatArray, odometry_ns: Stamps, motions: FloatArray) -> Alignment:
+    if not (len(seen_ns) and len(odometry_ns)):
+        return UNKNOWN
+    zero_ns = min(seen_ns[0], odometry_ns[0])
+    return align_odometry((seen_ns - zero_ns) * 1e-9, poses, (odometry_ns - zero_ns) * 1e-9, motions)
+
+
+def _last_of_each(at_ns: Stamps, *columns: FloatArray) -> tuple[Stamps, FloatArray]:
+    """Every moment once, in order, with the last numbers that there are of it."""
+    moments, backwards = np.unique(at_ns[::-1], return_index=True)
+    return moments, np.column_stack([column[::-1][backwards] for column in columns])
+
+
+def judge_kept_motion(kept: Kept) -> dict[str, float]:
+    """The same as :func:`judge_own_motion`, of what a replay in one pass has kept."""
+    poses, motions = kept.poses, kept.motions
+    seen_ns, seen = _last_of_each(poses["capture_ns"], poses["x"], poses["y"], poses["theta"])
+    odometry_ns, moved = _last_of_each(motions["stamp_ns"], motions["v2"], motions["u2"])
+    return _figures(_aligned(seen_ns, seen, odometry_ns, moved))
 
 
 def judge_own_motion(log: Log, scenario: Scenario) -> dict[str, float]:
@@ -75,7 +98,10 @@ def judge_own_motion(log: Log, scenario: Scenario) -> dict[str, float]:
     """
     if not {topics.RIGID_BODIES, topics_of(scenario).odom} <= set(log.topics):
         return {}
-    found = own_alignment(own_record(log, scenario))
+    return _figures(own_alignment(own_record(log, scenario)))
+
+
+def _figures(found: Alignment) -> dict[str, float]:
     result: dict[str, float] = {}
     for name, known in (("delay_s", found.delay), ("scale_v", found.scale_v), ("scale_u", found.scale_u)):
         if known is not None:

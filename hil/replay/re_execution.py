@@ -7,7 +7,7 @@ Every estimate and every command lists what its node had taken in since the one 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -16,6 +16,7 @@ from hil.nodes.node import Node, Outgoing
 from hil.wire.events import TICK, Event
 
 S = TypeVar("S")
+P = TypeVar("P", bound=Hashable)
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +142,7 @@ def parity_of(repeated: Sequence[Repeated], topic: str, beside: Mapping[str, Seq
     unrecorded = 0
     for name, logged in beside.items():
         sent = [(payload, place) for place, step in enumerate(repeated) for payload in _payloads(step, name)]
-        differing, missed = _compare_in_order(sent, logged)
+        differing, missed = compare_in_order(sent, logged)
         wrong |= differing
         unrecorded += missed
     first = min(wrong, default=None)
@@ -167,8 +168,10 @@ def parity_beside(outputs: Iterable[Outgoing], topic: str, logged: Sequence[byte
     return Parity(compared, len(wrong), min(wrong, default=None), max(0, sent - compared))
 
 
-def _compare_in_order(sent: Sequence[tuple[bytes, int]], logged: Sequence[bytes]) -> tuple[set[int], int]:
+def compare_in_order(sent: Sequence[tuple[P, int]], logged: Sequence[P]) -> tuple[set[int], int]:
     """Places of what was sent and is logged as something else, and how much is not logged at all.
+
+    ``sent``: payloads, or what stands for them, each with its place.
 
     Both are walked in step. What one has and the other does not is passed over: the recorder can miss a
     message, and others can send on the topic. Only where both happen at once, one was put for the other.

@@ -88,13 +88,18 @@ def replay_chain(log: Log, scenario: Scenario | None = None) -> tuple[Replay, ..
 
     Raises :class:`UsageError` too if the scenario has more or fewer agents than the log.
     """
+    return tuple(replay_link(log, link, was) for link, was in linked(log, scenario))
+
+
+def linked(log: Log, scenario: Scenario | None = None) -> list[tuple[Link, Link]]:
+    """Links of a scenario (the log's own by default), each with the log's own; raises as above."""
     own = links_of(_own_scenario(log))
     chosen = own if scenario is None else links_of(scenario)
     if len(chosen) != len(own):
         raise UsageError(
             f"log {log.path}: has {len(own) + 1} agents, expected as many as chain.agents = {len(chosen) + 1}"
         )
-    return tuple(replay_link(log, link, was) for link, was in zip(chosen, own, strict=True))
+    return list(zip(chosen, own, strict=True))
 
 
 def replay_link(log: Log, chosen: Link, own: Link) -> Replay:

@@ -30,7 +30,7 @@ def stops_of(data: PlotData) -> list[TimeInterval]:
     """Intervals over which the robot was told to stand still, by reason, while the run lasted."""
     issued_ns = data.columns.commands.issued_ns
     during = inside(issued_ns, data.columns.run) & (issued_ns < data.columns.run.to_ns)
-    reasons = [each.stop for each, counts in zip(data.run_data.commands, during, strict=True) if counts]
+    reasons = [stop for stop, counts in zip(data.columns.commands.stop, during, strict=True) if counts]
     intervals = intervals_of(data.seconds(issued_ns[during]), reasons, LONGEST_LINE)
     return [interval for interval in intervals if interval.what]
 

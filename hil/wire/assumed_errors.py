@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from estimation.bounds.error_bounds import InputErrors, Perceived, RateErrors
 from estimation.bounds.guarantees import guaranteed_rate, leader_acceleration
 from estimation.bounds.live_bounds import ErrorBounds, LawConstants, Moment, MomentBounds, bounds_at
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.own_motion.steady_noise import steady_noise
 from estimation.tracking.estimate import Estimate
+from formation.angles import FloatArray
 from formation.kernel import kernel
 from formation.spacing import Spacing
 from hil.scenario.leader_model import own_noise
@@ -72,6 +75,13 @@ class AssumedErrors(NamedTuple):
             self.E_v2,
             self.E_u2,
         )
+
+    def bearing_errors(self, rho: FloatArray) -> FloatArray:
+        """E_alpha2 of :meth:`errors` at many distances."""
+        if not self.bearing_grows:
+            return np.full(len(rho), _SIGMAS * self.sd_bearing)
+        across = self.sd_range / rho
+        return _SIGMAS * np.sqrt(across * across + self.sd_bearing * self.sd_bearing)
 
     def at(self, rho: float) -> tuple[RateErrors, InputErrors]:
         """The same as :meth:`errors`, for the bounds on arrays."""

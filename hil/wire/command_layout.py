@@ -1,12 +1,113 @@
-"""A controller's decisions, ``abreast_msgs/Command``, and the true states, ``Truth``, written into bytes."""
+"""Decisions, ``abreast_msgs/Command``, and the true states, ``Truth``, read from and written into bytes."""
 
 from __future__ import annotations
 
 from formation.kernel import kernel
-from formation.records import Buffer, Rows, write_byte, write_float, write_int32
-from hil.wire.cdr import HEAD_BYTES, aligned, write_stamp, write_text
-from hil.wire.estimate_layout import write_receipts
-from hil.wire.records import CommandNumbers, Receipt, TruthNumbers
+from formation.records import (
+    Buffer,
+    Rows,
+    read_byte,
+    read_float,
+    read_uint32,
+    write_byte,
+    write_float,
+    write_int32,
+)
+from hil.wire.cdr import (
+    HEAD_BYTES,
+    STAMP_BYTES,
+    after_header,
+    after_text,
+    aligned,
+    begin,
+    ends,
+    fits,
+    read_stamp,
+    text_number,
+    write_stamp,
+    write_text,
+)
+from hil.wire.estimate_layout import RECEIPT_BYTES, write_receipts
+from hil.wire.records import (
+    CommandNumbers,
+    ReadCommand,
+    ReadTruth,
+    Receipt,
+    Stamp,
+    TruthNumbers,
+    is_time,
+    ns_of,
+)
+
+_STOP_AT = 33
+_NUMBERS_BYTES = 80
+_NO_COMMAND = ReadCommand(False, 0, CommandNumbers(0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, False, False))
+_NO_TRUTH = ReadTruth(
+    False, Stamp(0, 0), TruthNumbers(0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+)
+
+
+@kernel(inline=False)
+def read_command(payload: bytes, stops: bytes) -> ReadCommand:
+    """Read ``abreast_msgs/Command``; ``sound`` also asks for stamps after 1970.
+
+    ``stops``: packed texts of the reasons that its ``stop`` is counted by, -1 for another one.
+    """
+    times_at = aligned(after_header(payload, begin(payload)), 4)
+    at = aligned(times_at + 2 * STAMP_BYTES, 8)
+    if times_at < 0 or not fits(payload, at, _STOP_AT):
+        return _NO_COMMAND
+    fresh_at = after_text(payload, at + _STOP_AT)
+    counted_at = aligned(fresh_at + 1, 4)
+    if fresh_at < 0 or not fits(payload, counted_at, 4):
+        return _NO_COMMAND
+    consumed, end = read_uint32(payload, counted_at), counted_at + 4
+    receipts_at = aligned(end, 8)
+    if consumed > 0:
+        end = receipts_at + consumed * RECEIPT_BYTES
+    stamp, capture = read_stamp(payload, HEAD_BYTES), read_stamp(payload, times_at)
+    measured = read_stamp(payload, times_at + STAMP_BYTES)
+    if not (ends(payload, end) and is_time(stamp) and is_time(capture) and is_time(measured)):
+        return _NO_COMMAND
+    numbers = CommandNumbers(
+        ns_of(stamp),
+        ns_of(capture),
+        ns_of(measured),
+        text_number(stops, payload, aligned(at + _STOP_AT, 4)),
+        consumed,
+        read_float(payload, at),
+        read_float(payload, at + 8),
+        read_float(payload, at + 16),
+        read_float(payload, at + 24),
+        read_byte(payload, at + 32) != 0,
+        read_byte(payload, fresh_at) != 0,
+    )
+    return ReadCommand(True, receipts_at, numbers)
+
+
+@kernel(inline=False)
+def read_truth(payload: bytes) -> ReadTruth:
+    """Read ``abreast_msgs/Truth``."""
+    number_at = aligned(after_header(payload, begin(payload)), 4)
+    at = aligned(number_at + 4, 8)
+    if number_at < 0 or not fits(payload, at, _NUMBERS_BYTES) or not ends(payload, at + _NUMBERS_BYTES):
+        return _NO_TRUTH
+    stamp = read_stamp(payload, HEAD_BYTES)
+    numbers = TruthNumbers(
+        ns_of(stamp),
+        read_uint32(payload, number_at),
+        read_float(payload, at),
+        read_float(payload, at + 8),
+        read_float(payload, at + 16),
+        read_float(payload, at + 24),
+        read_float(payload, at + 32),
+        read_float(payload, at + 40),
+        read_float(payload, at + 48),
+        read_float(payload, at + 56),
+        read_float(payload, at + 64),
+        read_float(payload, at + 72),
+    )
+    return ReadTruth(True, stamp, numbers)
 
 
 @kernel(inline=False)

@@ -38,7 +38,9 @@ _ELEMENTS = 25
 _NIS_AT = COVARIANCE_AT + _ELEMENTS * 8
 _STATUS_AT = _NIS_AT + 8
 _BOUNDS_BYTES = 3 * 8
-_RECEIPT_BYTES = 16
+RECEIPT_BYTES = 16
+"""Length of an ``abreast_msgs/Consumed``."""
+
 _NO_NUMBERS = EstimateNumbers(
     0, 0, 0, 0, -1, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
@@ -58,7 +60,7 @@ def read_estimate(payload: bytes) -> ReadEstimate:
     consumed, end = read_uint32(payload, bounds_at + _BOUNDS_BYTES), bounds_at + _BOUNDS_BYTES + 4
     receipts_at = aligned(end, 8)
     if consumed > 0:
-        end = receipts_at + consumed * _RECEIPT_BYTES
+        end = receipts_at + consumed * RECEIPT_BYTES
     capture, measured = read_stamp(payload, HEAD_BYTES), read_stamp(payload, times_at)
     if not (ends(payload, end) and is_time(capture) and is_time(measured)):
         return _NO_ESTIMATE

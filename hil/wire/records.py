@@ -207,6 +207,22 @@ class TruthNumbers(NamedTuple):
     u2: float
 
 
+class ReadCommand(NamedTuple):
+    """A decision as it came; ``receipts_at``: where these lie in the payload."""
+
+    sound: bool
+    receipts_at: int
+    numbers: CommandNumbers
+
+
+class ReadTruth(NamedTuple):
+    """True states as they came; ``stamp`` may be no time."""
+
+    sound: bool
+    stamp: Stamp
+    numbers: TruthNumbers
+
+
 class Receipt(NamedTuple):
     """Receipt of one input: when it was taken in, and its digest, whose 64 bits stand for a signed number."""
 

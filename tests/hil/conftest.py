@@ -11,7 +11,8 @@ from estimation.tracking.tracker import Status
 from formation import pose as plane
 from formation.angles import wrap
 from formation.shape import Shape, follower_pose, shape_of, shape_rates
-from hil.judge.run_data import Frames, LogFacts, RunData
+from hil.judge.frames import Frames
+from hil.judge.run_data import LogFacts, RunData
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import Log, read_log
 from hil.scenario.files import load_scenario

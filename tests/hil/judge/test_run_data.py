@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from hil.errors import UsageError
-from hil.judge.run_data import Frames, RunData, Span, evaluation_span, run_data_of_log, run_span
+from hil.judge.frames import Frames
+from hil.judge.run_data import RunData, Span, evaluation_span, run_data_of_log, run_span
 from hil.judge.summary import summarise
 from hil.log.metadata import log_metadata
 from hil.log.reader import Log, read_log

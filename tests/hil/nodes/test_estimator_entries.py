@@ -12,7 +12,7 @@ from estimation.tracking.tracker import Status
 from formation.pose import Motion, Pose
 from hil.emulator.lab_messages import frame_message, odometry_message
 from hil.nodes.estimator import EstimatorNode
-from hil.nodes.estimator_entries import RESTARTED, SEEN, SET_BACK, TICK_NS
+from hil.nodes.estimator_inputs import RESTARTED, SEEN, SET_BACK, TICK_NS
 from hil.nodes.estimator_memory import EstimatorMemory
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg

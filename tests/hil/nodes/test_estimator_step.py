@@ -25,7 +25,7 @@ from formation.lending import lent
 from formation.pose import Pose, advance
 from formation.records import Rows, columns_of, load, rows_of, store
 from formation.ring import Ring
-from hil.nodes import estimator_entries as entries
+from hil.nodes import estimator_inputs as inputs
 from hil.nodes.estimator_desk import Desk, NodeRules, Notes, SensorRules, TimedFrame
 from hil.nodes.estimator_entries import COMPILED, PLAIN
 from hil.nodes.estimator_memory import EstimatorMemory
@@ -101,14 +101,14 @@ class Estimator:
     def take(self, message: Message, now_ns: int) -> Outcome | None:
         if isinstance(message, MotionSample):
             store(self.desk.sample, 0, message)
-            self._steps.take(self._lent, entries.ODOMETRY, REASONS, now_ns)
+            self._steps.take(self._lent, inputs.ODOMETRY, REASONS, now_ns)
             return None
         if isinstance(message, TimedFrame):
             store(self.desk.frame, 0, message)
-            self._steps.take(self._lent, entries.FRAME, REASONS, now_ns)
+            self._steps.take(self._lent, inputs.FRAME, REASONS, now_ns)
         else:
             store(self.desk.sighting, 0, message)
-            self._steps.take(self._lent, entries.SIGHTING, REASONS, now_ns)
+            self._steps.take(self._lent, inputs.SIGHTING, REASONS, now_ns)
         notes = load(Notes, self.desk.notes, 0)
         return Outcome(notes.verdict, notes.cause, notes.late)
 
