@@ -1,7 +1,7 @@
 """What `abreast follower` costs live: its round trip against null handlers, and how long a chain it carries.
 
     python benchmarks/follower.py trip [--rates 120,240] [--rounds 7] [--seconds 4]
-    python benchmarks/follower.py chain [--ways follower,apart] [--followers 24,50] [--seconds 10]
+    python benchmarks/follower.py chain [--ways follower,apart] [--followers 24,50] [--undisturbed]
 
 ``trip``: from a mocap frame's publication to the drive command that follows from it, all in one process that
 plays motion capture and robot. The null handlers are two processes in the places of estimator and controller:
@@ -10,7 +10,8 @@ Every way has a router of its own; all take turns, and ratios are medians over t
 
 ``chain``: emulator and followers, a router, and a listener to what the followers decide: from the capture
 that a command rests on to its reception there, less the emulated latency. With ``--recorder`` there is one of
-these too. Shares of a core are of all processes.
+these too. With ``--undisturbed`` all processes go before all others on the machine while it is measured, for
+one that is busy; that takes the right to. Shares of a core are of all processes.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -74,6 +75,13 @@ def spent(pid: int) -> float:
     """Processor time of a process so far [s]."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def go_first(pids: Iterable[int], policy: int) -> None:
+    """Schedule all threads of processes: before those of others by SCHED_RR, like them by SCHED_OTHER."""
+    for pid in pids:
+        for thread in Path(f"/proc/{pid}/task").iterdir():
+            os.sched_setscheduler(int(thread.name), policy, os.sched_param(int(policy == os.SCHED_RR)))
 
 
 def serve_router(endpoint: str) -> None:
@@ -234,7 +242,9 @@ def ages(heard: list[tuple[int, str, bytes]], latency_s: float) -> list[float]:
     return found
 
 
-def measure_chain(way: str, followers: int, seconds: float, recorder: bool) -> None:
+def measure_chain(
+    way: str, followers: int, seconds: float, *, recorder: bool = False, undisturbed: bool = False
+) -> None:
     scenario = load_scenario(CHAIN, [f"chain.agents={followers + 1}", "run.duration_s=3600"])
     with ExitStack() as stack:
         endpoint = stack.enter_context(reserved_endpoint())
@@ -253,10 +263,16 @@ def measure_chain(way: str, followers: int, seconds: float, recorder: bool) -> N
         ear = Ear(endpoint)
         stack.callback(ear.close)
         ear.wait_until_driven(followers)
+        if undisturbed:
+            go_first([*pids.values(), os.getpid()], os.SCHED_RR)
+            time.sleep(1.0)
+            ear.heard.clear()
         before, begun = {name: spent(pid) for name, pid in pids.items()}, time.monotonic()
         time.sleep(seconds)
         heard, took = list(ear.heard), time.monotonic() - begun
         shares = {name: (spent(pid) - before[name]) / took for name, pid in pids.items()}
+        if undisturbed:
+            go_first([*pids.values(), os.getpid()], os.SCHED_OTHER)
         found = ages(heard, scenario.mocap.latency_s)
         due = followers * took * scenario.mocap.rate_hz
         p50, p99 = np.percentile(found, [50, 99]) if found else (np.nan, np.nan)
@@ -282,13 +298,15 @@ def main() -> None:
     parser.add_argument("--ways", default="follower")
     parser.add_argument("--followers", default="24,50")
     parser.add_argument("--recorder", action="store_true")
+    parser.add_argument("--undisturbed", action="store_true")
     given = parser.parse_args()
     if given.what == "trip":
         rates = [float(rate) for rate in given.rates.split(",")]
         return measure_trips(rates, given.rounds, given.seconds or 4.0)
     for count in given.followers.split(","):
         for way in given.ways.split(","):
-            measure_chain(way, int(count), given.seconds or 10.0, given.recorder)
+            options = {"recorder": given.recorder, "undisturbed": given.undisturbed}
+            measure_chain(way, int(count), given.seconds or 10.0, **options)
     return None
 
 

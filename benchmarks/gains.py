@@ -107,9 +107,9 @@ def _with_gains(gains: Gains) -> list[str]:
 def proposed(robot: str) -> Gains:
     """Gains that are proposed for a robot; raises :class:`ValueError` if there are none."""
     found = propose(load_scenario("turtlebot3", ROBOTS[robot][0]))
-    if found["gains"] is None:
-        raise ValueError(f"no gains for {robot}: {found['why']}")
-    gains = found["gains"]
+    if found.gains is None:
+        raise ValueError(f"no gains for {robot}: {found.why}")
+    gains = found.gains
     return gains["mu1"], gains["mu2"], gains["mu_rho"]
 
 

@@ -15,6 +15,7 @@ import keyword
 import math
 from collections import namedtuple
 from collections.abc import Callable, Mapping
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 from formation.address import Address, called
@@ -44,10 +45,12 @@ class SeenShape(NamedTuple):
 
 
 class Shape(SeenShape):
-    """The same from distance and bearings alone, to try a law by hand.
+    """The same from distance [m] and bearings [rad] alone, to try a law by hand.
 
-    >>> Shape(0.5, -0.5 * math.pi, 0.5 * math.pi).sin1
-    -1.0
+    >>> import abreast, math
+    >>> shape = abreast.Shape(0.5, -0.5 * math.pi, 0.5 * math.pi)
+    >>> shape.rho, shape.sin1, shape.sin2
+    (0.5, -1.0, 1.0)
     """
 
     __slots__ = ()
@@ -59,10 +62,46 @@ class Shape(SeenShape):
 
 
 class Leader(NamedTuple):
-    """The leader's speed v1 [m/s] and turn rate u1 [rad/s], nan where the estimator has none."""
+    """The leader's speed v1 [m/s] and turn rate u1 [rad/s], nan where the estimator has none.
+
+    >>> import abreast
+    >>> abreast.Leader(v1=0.08, u1=0.7).v1
+    0.08
+    """
 
     v1: float
     u1: float
+
+
+class Gains(SimpleNamespace):
+    """What a law of one's own goes by, to try it by hand: the scenario's gains, and its own parameters.
+
+    ``mu1``, ``mu2`` [rad/s], ``mu_rho`` [1/m], ``rho_0`` [m], ``bearing`` [rad], and the limits ``v_max``
+    [m/s], ``u_max`` [rad/s], infinite for none.
+
+    >>> import abreast, math
+    >>> def turning_back(shape, leader, gains):
+    ...     return leader.v1, gains.mu2 * shape.cos2 + gains.k
+    >>> gains = abreast.Gains(mu1=1.5, mu2=1.5, mu_rho=20.0, rho_0=0.2, k=0.1)
+    >>> v2, u2 = turning_back(abreast.Shape(0.2, -1.5, math.pi), abreast.Leader(0.08, 0.0), gains)
+    >>> round(v2, 3), round(u2, 3)
+    (0.08, -1.4)
+    """
+
+    def __init__(
+        self,
+        *,
+        mu1: float,
+        mu2: float,
+        mu_rho: float,
+        rho_0: float,
+        bearing: float = 0.5 * math.pi,
+        v_max: float = math.inf,
+        u_max: float = math.inf,
+        **parameters: float,
+    ) -> None:
+        usual = (mu1, mu2, mu_rho, rho_0, bearing, v_max, u_max)
+        super().__init__(**dict(zip(GIVEN, usual, strict=True)), **parameters)
 
 
 class Asked(NamedTuple):

@@ -18,7 +18,12 @@ class Pose(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Speed v [m/s] along the heading and turn rate u [rad/s], counter-clockwise positive."""
+    """Speed v [m/s] along the heading and turn rate u [rad/s], counter-clockwise positive.
+
+    >>> import abreast
+    >>> abreast.Motion(v=0.1, u=-0.5).u
+    -0.5
+    """
 
     v: float
     u: float

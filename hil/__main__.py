@@ -1,5 +1,5 @@
 """``python -m hil``: the same as the console script ``abreast``."""
 
-from hil.command_line import main
+from abreast.__main__ import main
 
 main()

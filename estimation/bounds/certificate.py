@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -40,10 +41,23 @@ class Claim:
     assumes: tuple[str, ...] = ()
     why: str | None = None
 
+    def as_dict(self) -> dict[str, Any]:
+        """The figures, ``assumes``, and ``why`` where there is one, as plain values."""
+        entry: dict[str, Any] = {**self.figures, "assumes": list(self.assumes)}
+        return entry if self.why is None else entry | {"why": self.why}
+
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """All claims; ``velocity_error``: guaranteed error W of the leader's velocity [m/s] in any direction."""
+    """All claims; ``velocity_error``: guaranteed error W of the leader's velocity [m/s] in any direction.
+
+    Each claim has its ``figures`` by name, what it ``assumes``, and ``why`` there are none if there are none.
+
+    >>> import abreast
+    >>> found = abreast.bounds("turtlebot3")
+    >>> print(f"v1 within {found.estimates.figures['M_v1']:.4f} m/s, {found.formation.assumes[0]}")
+    v1 within 0.0205 m/s, |u1| <= k_u = 0.7 rad/s
+    """
 
     velocity_error: float
     rates: Claim
@@ -59,6 +73,10 @@ class Certificate:
         """Claims by name, in the order in which they follow from each other."""
         names = [name for name in self.__slots__ if name != "velocity_error"]
         return {name: getattr(self, name) for name in names}
+
+    def as_dict(self) -> dict[str, dict[str, Any]]:
+        """The JSON of ``abreast bounds``: per claim its figures, ``assumes``, and ``why``."""
+        return {name: claim.as_dict() for name, claim in self.claims().items()}
 
 
 @lru_cache(maxsize=32)

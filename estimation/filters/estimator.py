@@ -22,6 +22,29 @@ class Estimator(Protocol):
     """A recursive estimator in matrices: pure, its whole state is the belief.
 
     Those that derive from it have ``step`` out of their ``predict`` and ``update``.
+
+    >>> import abreast, numpy as np
+    >>> class Plain(abreast.Estimator):
+    ...     def __init__(self, model):
+    ...         self.model = model
+    ...     def start(self, measurement):
+    ...         return self.model.start(measurement)
+    ...     def predict(self, belief, dt, follower):
+    ...         F = self.model.transition(belief.mean, dt, follower)
+    ...         Q = self.model.process_noise(belief.mean, dt, follower)
+    ...         mean = self.model.propagate(belief.mean, dt, follower)
+    ...         return belief._replace(mean=mean, covariance=F @ belief.covariance @ F.T + Q)
+    ...     def update(self, belief, measurement):
+    ...         P = belief.covariance
+    ...         K = P[:, :2] @ np.linalg.inv(P[:2, :2] + measurement.covariance)
+    ...         mean = belief.mean + K @ (measurement.position - belief.mean[:2])
+    ...         return belief._replace(mean=mean, covariance=P - K @ P[:2])
+    >>> t = np.arange(0.0, 2.0, 0.01)
+    >>> leader = np.column_stack([0.1 * t, np.full_like(t, 0.25)])
+    >>> follower = np.column_stack([0.1 * t, 0.0 * t, 0.0 * t])
+    >>> found = abreast.estimate(t, leader, follower, estimator=Plain)
+    >>> print(f"{found.v1[-1]:.3f} m/s")
+    0.100 m/s
     """
 
     model: Model

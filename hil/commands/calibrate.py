@@ -13,8 +13,7 @@ from hil.log.report_json import print_json
 
 if TYPE_CHECKING:
     from estimation.calibration.sensor_bias import SensorBias
-    from hil.replay.timing import Timing
-    from hil.scenario.schema import Scenario
+    from hil.replay.lab_calibration import Calibration
 
 _MEANINGS = {
     "lag_s": "first-order lag of the robot's actuators",
@@ -40,59 +39,34 @@ def command(log: Path, follower: str | None, from_s: float | None, to_s: float |
     --from and --to are seconds since the first sighting or, for the timing, the first odometry; for imported
     recordings the source's own time.
     """
-    from hil.log.metadata import scenario_of
     from hil.log.reader import read_log
-    from hil.replay.calibration import calibrate
-    from hil.replay.timing import timing_of
-    from hil.scenario.links import link_of, refuse_chain
-    from hil.wire.topics import topics_of
+    from hil.replay.lab_calibration import calibration_of
 
     if from_s is not None and to_s is not None and to_s <= from_s:
         raise UsageError(f"--to {to_s:g}: expected more than --from {from_s:g}")
-    given = read_log(log)
-    whole = scenario_of(given)
-    if whole is None:
-        raise UsageError(f"log {log}: was not made by abreast; turn it into one with: abreast import")
-    if follower is None:
-        refuse_chain(whole, "name a follower of it with --follower")
-    scenario = whole if follower is None else link_of(whole, follower).scenario
-    timing = timing_of(given, scenario, from_s, to_s)
-    sighting = topics_of(scenario).sighting
-    sighted = sighting in given.topics
-    if not (timing.known or sighted):
-        raise UsageError(
-            f"log {log}: has no sightings to calibrate (no topic {sighting!r}); {'; '.join(timing.unknown)}"
-        )
-    offsets = calibrate(given, scenario, from_s, to_s) if sighted else None
-    result = _say_timing(timing, scenario)
-    if offsets is not None:
-        result |= _say_offsets(log, offsets)
+    found = calibration_of(read_log(log), follower, from_s, to_s)
+    _say_timing(found)
+    if found.offsets is not None:
+        _say_offsets(log, found.offsets)
     if as_json:
-        print_json(result)
+        print_json(found.as_dict())
 
 
-def _say_timing(timing: Timing, scenario: Scenario) -> dict[str, object]:
-    """Print the timing, what is unknown of it, and its settings, and return it for JSON."""
-    from hil.replay.timing import VAGUE
-
-    result: dict[str, object] = {}
-    for name, known in timing.keys(scenario).items():
+def _say_timing(found: Calibration) -> None:
+    """Print the timing, what is unknown of it, and its settings."""
+    for name, known in found.timing.items():
         click.echo(f"{name:19} {known.value:+.4f} s give or take {known.sd:.4f}: {_MEANINGS[name]}", err=True)
-        result |= {name: known.value, f"{name}_sd": known.sd}
-    for line in timing.unknown:
+    for line in found.unknown:
         click.echo(line, err=True)
-    settings = timing.settings(scenario)
-    if timing.lateness is not None and timing.lateness.sd >= VAGUE:
+    if found.uncertain:
         click.echo("the offset of stamps is too uncertain to be set: drive for 30 s", err=True)
-    if settings:
-        options = " ".join(f"--set {key}={value:.4f}" for key, value in settings.items())
+    if found.settings:
+        options = " ".join(f"--set {key}={value:.4f}" for key, value in found.settings.items())
         click.echo(f"run next with: {options}", err=True)
-        result["settings"] = settings
-    return result
 
 
-def _say_offsets(log: Path, found: SensorBias) -> dict[str, object]:
-    """Print the offsets of a sensor and their settings, and return them for JSON."""
+def _say_offsets(log: Path, found: SensorBias) -> None:
+    """Print the offsets of a sensor and their settings."""
     offsets = {"range_bias": found.range, "bearing_bias": found.bearing}
     for (name, offset), unit in zip(offsets.items(), ("m", "rad"), strict=True):
         click.echo(
@@ -106,7 +80,3 @@ def _say_offsets(log: Path, found: SensorBias) -> dict[str, object]:
         f"abreast replay {log} {settings}",
         err=True,
     )
-    result: dict[str, object] = {"samples": found.samples, "outliers": found.outliers}
-    for name, offset in offsets.items():
-        result |= {name: offset.value, f"{name}_sd": offset.sd, f"{name}_spread": offset.spread}
-    return result

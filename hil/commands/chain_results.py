@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,39 +12,15 @@ from hil.errors import CheckFailedError
 from hil.judge.chain_pairs import driven_trajectory
 from hil.judge.chain_summary import summarise_chain
 from hil.judge.chain_text import print_chain
-from hil.judge.replay_verdict import (
-    Played,
-    evaluated,
-    fed_json,
-    parity_json,
-    print_fed,
-    refuse_other_steps,
-    run_data_of_replay,
-    violated_bounds,
-    why_not_same,
-)
+from hil.judge.replay_verdict import evaluated, print_fed, violated_bounds
+from hil.judge.replayed import Replayed
 from hil.judge.run_data import RunData, run_data_of_link
-from hil.log.metadata import scenario_of
 from hil.log.reader import Log
 from hil.log.report_json import print_json, write_json
 from hil.replay.estimate_csv import write_estimates
-from hil.replay.log_replay import kept_replays
-from hil.replay.rerun import linked, replay_chain
 from hil.reports.judged_log import made_folder
 from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
-
-
-@dataclass(frozen=True, slots=True)
-class Wishes:
-    """What is asked of a replay besides the estimates: a comparison, strictness, where files go, a span."""
-
-    verify: bool
-    strict: bool
-    as_json: bool
-    from_s: float | None
-    to_s: float | None
-    out: Path | None
 
 
 def judge_run(log: Log, scenario: Scenario, folder: Path) -> dict[str, Any]:
@@ -62,34 +37,22 @@ def judge_run(log: Log, scenario: Scenario, folder: Path) -> dict[str, Any]:
     return summary
 
 
-def replay_run(log: Log, chosen: Scenario, wishes: Wishes) -> None:
-    """Replay the log of a chain by a scenario, and do with the result what is wished."""
-    own = scenario_of(log)
-    if wishes.verify and own is not None:
-        refuse_other_steps(chosen, own)
-    kept = kept_replays(log, linked(log, chosen))
-    played: Sequence[Played] = replay_chain(log, chosen) if kept is None else kept
-    runs = [run_data_of_replay(log, each, wishes.from_s, wishes.to_s) for each in played]
-    summary = summarise_chain(chosen, runs)
-    for pair, each in zip(summary["pairs"], played, strict=True):
-        pair |= fed_json(each)
-    print_fed(log, *played)
-    if wishes.verify:
-        summary["parity"] = parity_json(*played)
-        for pair, each in zip(summary["pairs"], played, strict=True):
-            pair["parity"] = parity_json(each)
-    if wishes.out is not None:
-        _write(chosen, runs, summary, made_folder(wishes.out), "replay.png")
-        for run_data in runs:
-            name = run_data.scenario.follower.name
-            write_estimates(evaluated(run_data), wishes.out / f"estimates-{name}.csv")
+def leave_replay(
+    log: Log, done: Replayed, out: Path | None, *, as_json: bool, verify: bool, strict: bool
+) -> None:
+    """Leave what came of the replay of a chain's log where it is wished, print it, and check it."""
+    summary = done.summary
+    print_fed(log, *done.played)
+    if out is not None:
+        _write(done.scenario, done.runs, summary, made_folder(out), "replay.png")
+        for run_data in done.runs:
+            write_estimates(evaluated(run_data), out / f"estimates-{run_data.scenario.follower.name}.csv")
     print_chain(summary)
-    if wishes.as_json:
+    if as_json:
         print_json(summary)
-    reasons = [why_not_same(log, each) for each in played] if wishes.verify else []
-    if reason := next(filter(None, reasons), ""):
+    if verify and (reason := done.why_not_same(log)):
         raise CheckFailedError(reason)
-    if wishes.strict:
+    if strict:
         _refuse_violated(log, summary)
 
 

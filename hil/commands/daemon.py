@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from formation.collector import collector_paused
-from hil.commands.own_parts import load_own_parts
+from hil.commands.own_parts import load_own_parts, remarks_on
 from hil.commands.seconds import DURATION
 from hil.errors import UsageError
 from hil.scenario.certify import CERTIFY
@@ -136,7 +136,12 @@ def _controller(order: Order) -> Worker:
     from hil.live.node_worker import NodeWorker
     from hil.nodes.link_nodes import controller_node
 
-    return NodeWorker([controller_node(link) for link in order.links], parting=_parting("controller", order))
+    controllers = [controller_node(link) for link in order.links]
+    return NodeWorker(
+        controllers,
+        parting=_parting("controller", order),
+        after_tick=remarks_on({node.law for node in controllers}),
+    )
 
 
 def _follower(order: Order) -> Worker:
@@ -148,6 +153,7 @@ def _follower(order: Order) -> Worker:
         [*map(estimator_node, order.links), *controllers],
         within=[node.topics.estimate for node in controllers],
         parting=_parting("follower", order),
+        after_tick=remarks_on({node.law for node in controllers}),
     )
 
 

@@ -18,7 +18,7 @@ def command(scenario: str, overrides: tuple[str, ...], as_json: bool) -> None:
 
     proposal = propose(load_scenario(scenario, overrides))
     if as_json:
-        print_json(proposal)
+        print_json(proposal.as_dict())
         return
     for line in report_lines(proposal):
         click.echo(line, err=True)

@@ -2,10 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
 import click
 
+from controllers.own_law import OwnLaw
 from hil.extensions.reference import is_reference, short
 from hil.scenario.schema import Scenario
+
+
+def remarks_on(laws: Iterable[OwnLaw | None]) -> Callable[[], None]:
+    """What says on stderr that a law of one's own failed, once for every error; to be called now and then."""
+    known = [law for law in laws if law is not None]
+    said = dict.fromkeys((law.name for law in known), "")
+
+    def remark() -> None:
+        for law in known:
+            if law.failures() and (failure := law.failure()) != said[law.name]:
+                said[law.name] = failure
+                click.echo(f"law {law.name} failed, the robot is told to stand still: {failure}", err=True)
+
+    return remark
 
 
 def load_own_parts(scenario: Scenario, *, estimates: bool = True) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,13 +12,9 @@ from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
 from hil.log.report_json import print_json
 from hil.reports.judged_log import leave, made_folder
-from hil.scenario.certify import CERTIFY, same_steps
 
 if TYPE_CHECKING:
-    from hil.judge.replay_verdict import Played
     from hil.judge.run_data import RunData
-    from hil.log.reader import Log
-    from hil.scenario.links import Link
     from hil.scenario.schema import Scenario
 
 
@@ -68,37 +63,32 @@ def command(
     --from and --to are seconds since the leader set off, for imported recordings the source's own time; the
     steps always begin where the log does.
     """
-    from hil.judge.own_motion import judge_own_motion
-    from hil.judge.replay_verdict import (
-        fed_json,
-        parity_json,
-        print_fed,
-        run_data_of_replay,
-        violated_bounds,
-        why_not_same,
-    )
-    from hil.judge.summary import summarise
+    from hil.judge.replay_verdict import print_fed, violated_bounds
+    from hil.judge.replayed import ReplayChoice, chain_in, replayed
     from hil.judge.summary_text import print_summary
     from hil.log.reader import read_log
 
-    if from_s is not None and to_s is not None and to_s <= from_s:
-        raise UsageError(f"--to {to_s:g}: expected more than --from {from_s:g}")
-    given, overrides = _with_sources(read_log(log), estimator, law, overrides)
-    if certify:
-        overrides = (*overrides, CERTIFY)
-    if chart is None and follower is None and (chain := _chain(given, leader, overrides, table)):
-        from hil.commands.chain_results import Wishes, replay_run
+    given = read_log(log)
+    choice = ReplayChoice(
+        estimator=estimator,
+        law=law,
+        leader=leader,
+        follower=follower,
+        chart=chart,
+        overrides=overrides,
+        from_s=from_s,
+        to_s=to_s,
+        verify=verify,
+        certify=certify,
+    )
+    if (chain := chain_in(given, choice)) is not None:
+        from hil.commands.chain_results import leave_replay
 
-        replay_run(given, chain, Wishes(verify, strict, as_json, from_s, to_s, out))
+        _refuse_table(table, chain)
+        leave_replay(given, replayed(given, choice), out, as_json=as_json, verify=verify, strict=strict)
         return
-    played = _played(given, chart, leader, follower, overrides, verify=verify)
-    run_data = run_data_of_replay(given, played, from_s, to_s)
-    summary = summarise(run_data)
-    if chart is None and (own_motion := judge_own_motion(given, played)):
-        summary["own_motion"] = own_motion
-    if verify:
-        summary["parity"] = parity_json(played)
-    summary |= fed_json(played)
+    done = replayed(given, choice)
+    (played,), (run_data,), summary = done.played, done.runs, done.summary
     print_fed(given, played)
     _write(run_data, summary, table, out)
     print_summary(summary)
@@ -110,110 +100,21 @@ def command(
             click.echo(f"the {name} was started again during the run (times: {restarts})", err=True)
     if as_json:
         print_json(summary)
-    if verify and (reason := why_not_same(given, played)):
+    if verify and (reason := done.why_not_same(given)):
         raise CheckFailedError(reason)
     if strict and (broken := violated_bounds(summary)):
         counts = ", ".join(f"{name} by {count}" for name, count in broken.items())
         raise CheckFailedError(f"log {log}: bounds violated (samples): {counts}")
 
 
-def _with_sources(
-    log: Log, estimator: str | None, law: str | None, overrides: tuple[str, ...]
-) -> tuple[Log, tuple[str, ...]]:
-    """Log with its own law and estimator where they are now, and overrides for others than its own."""
-    from hil.log.description import RECORD
-    from hil.log.metadata import scenario_of
-    from hil.log.own_sources import with_sources
-    from hil.scenario.brought import settled_references
+def _refuse_table(table: Path | None, chain: Scenario) -> None:
+    from hil.scenario.links import links_of
 
-    chosen = settled_references(law, estimator)
-    placed = with_sources(log, chosen, RECORD)
-    own = scenario_of(placed)
-    kept = {} if own is None else {"law": own.controller.law, "estimator": own.estimator.kind}
-    keys = {"law": "controller.law", "estimator": "estimator.kind"}
-    others = [
-        f"{keys[noun]}={text}" for noun, text in chosen.items() if text is not None and text != kept.get(noun)
-    ]
-    return placed, (*overrides, *others)
-
-
-def _played(
-    log: Log,
-    chart: str | None,
-    leader: str | None,
-    follower: str | None,
-    overrides: Sequence[str],
-    *,
-    verify: bool,
-) -> Played:
-    """Replay of one of our logs, or of another lab's by its topic map."""
-    from hil.judge.replay_verdict import refuse_other_steps
-    from hil.log.metadata import scenario_of
-    from hil.replay.feeding import guessed_link, why_guessed
-    from hil.replay.rerun import replay_fed, replay_foreign
-    from hil.replay.topic_map import load_topic_map
-    from hil.scenario.files import with_overrides
-    from hil.scenario.links import Link, chain_of, link_of
-
-    if chart is not None:
-        if verify:
-            raise UsageError("--verify: a log that needs --map has no estimates of ours; leave one out")
-        return replay_foreign(log, load_topic_map(chart, leader, follower, overrides))
-    own = scenario_of(log)
-    if own is None:
-        link = guessed_link(log, leader, follower, overrides)
-        return replay_fed(log, link, why_guessed(link))
-    if chain_of(own) is not None and follower is not None:
-        _refuse_leader(leader)
-        link, was = link_of(with_overrides(own, overrides), follower), link_of(own, follower)
-        if verify:
-            refuse_other_steps(link.scenario, was.scenario)
-        return _in_one_pass(log, link, was)
-    names = {"leader.name": leader, "follower.name": follower}
-    renamed = [f"{key}={name}" for key, name in names.items() if name is not None]
-    chosen = with_overrides(own, [*overrides, *renamed])
-    if verify and not same_steps(chosen, own):
-        raise UsageError(
-            f"--verify compares with what was recorded: by {own.estimator.kind}, of leader "
-            f"{own.leader.name!r} and follower {own.follower.name!r}, with the log's own settings; leave out "
-            "what changes that"
-        )
-    return _in_one_pass(log, Link(chosen), Link(own))
-
-
-def _in_one_pass(log: Log, link: Link, was: Link) -> Played:
-    """Replay of one follower, message by message where it cannot be done in one pass."""
-    from hil.replay.log_replay import kept_replays
-    from hil.replay.rerun import replay_link
-
-    kept = kept_replays(log, [(link, was)])
-    return replay_link(log, link, was) if kept is None else kept[0]
-
-
-def _chain(log: Log, leader: str | None, overrides: Sequence[str], table: Path | None) -> Scenario | None:
-    """Scenario to replay all followers of a chain by; None for the log of a pair, or of others."""
-    from hil.log.metadata import scenario_of
-    from hil.scenario.files import with_overrides
-    from hil.scenario.links import chain_of, links_of
-
-    own = scenario_of(log)
-    if own is None or chain_of(own) is None:
-        return None
-    _refuse_leader(leader)
     if table is not None:
-        known = ", ".join(link.follower for link in links_of(own))
+        known = ", ".join(link.follower for link in links_of(chain))
         raise UsageError(
             f"--csv {table}: a file holds the estimates of one follower; give --follower with one of "
             f"{known}, or --out for all"
-        )
-    return with_overrides(own, overrides)
-
-
-def _refuse_leader(leader: str | None) -> None:
-    if leader is not None:
-        raise UsageError(
-            f"--leader {leader!r}: in the log of a chain everybody follows the robot before; "
-            "leave it out, and give --follower"
         )
 
 

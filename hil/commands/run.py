@@ -114,17 +114,14 @@ def _folder(scenario: Scenario, out: Path | None) -> Path:
 
 @collector_paused()
 def _lockstep(scenario: Scenario, log_path: Path) -> dict[str, float]:
-    from hil.lockstep.run import prepared, run_lockstep
+    from hil.lockstep.run import timed_lockstep
 
-    ready = prepared(scenario)
-    begun = time.perf_counter()
-    run_lockstep(scenario, log_path, ready)
-    took = time.perf_counter() - begun
-    times = scenario.run.duration_s / took
+    timing = timed_lockstep(scenario, log_path)
+    took, times = timing["wall_s"], timing["times_real_time"]
     click.echo(
         f"{scenario.run.duration_s:g} s in lockstep in {took:.2f} s ({times:.0f} times real time)", err=True
     )
-    return {"wall_s": took, "times_real_time": times}
+    return timing
 
 
 def _live(scenario: Scenario, log_path: Path, live: _Live) -> str:

@@ -6,14 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import click
-import msgspec
 
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION
-from hil.errors import UsageError
-from hil.log.report_json import known, print_json
+from hil.log.report_json import print_json
 from hil.scenario.files import load_scenario
-from hil.scenario.schema import Scenario
 
 
 @click.command("simulate")
@@ -37,6 +34,8 @@ def command(
 
     A pair drives without limits, unless it is told to change sides; a chain or a flock of agents within them.
     """
+    from hil.simulate.experiments import experiment
+
     chosen = [*overrides]
     if law is not None:
         chosen.append(f"controller.law={law}")
@@ -44,35 +43,14 @@ def command(
         chosen.append(f"run.duration_s={duration}")
     loaded = load_scenario(scenario, chosen)
     load_own_parts(loaded, estimates=False)
-    result = _simulate(loaded, out, stability=stability)
+    result = experiment(loaded, out, stability=stability).as_dict()
     if as_json:
         print_json(result)
         return
-    for key, value in known(result).items():
+    for key, value in result.items():
         click.echo(f"{key}: {_formatted(value)}", err=True)
     if out is not None:
         click.echo(f"pictures and trajectory.csv are in {out}", err=True)
-
-
-def _simulate(scenario: Scenario, out: Path | None, *, stability: bool) -> dict[str, object]:
-    chain, flock = scenario.chain, scenario.flock
-    if not isinstance(chain, msgspec.UnsetType):
-        _refuse_what_is_for_a_pair(scenario, "chain", stability=stability)
-        if not isinstance(flock, msgspec.UnsetType):
-            raise UsageError(
-                f"scenario {scenario.name}: it has a [chain] and a [flock]; leave one of them out"
-            )
-        from hil.simulate.chain_simulation import simulate_chain_of
-
-        return simulate_chain_of(scenario, chain.agents, out)
-    if not isinstance(flock, msgspec.UnsetType):
-        _refuse_what_is_for_a_pair(scenario, "flock", stability=stability)
-        from hil.simulate.flock_simulation import simulate_flock_of
-
-        return simulate_flock_of(scenario, flock, out)
-    from hil.simulate.pair_simulation import simulate
-
-    return simulate(scenario, out, stability=stability)
 
 
 def _formatted(value: Any) -> str:
@@ -93,10 +71,3 @@ def _formatted(value: Any) -> str:
         case float():
             return f"{value:.6g}"
     return str(value)
-
-
-def _refuse_what_is_for_a_pair(scenario: Scenario, section: str, *, stability: bool) -> None:
-    asked = {"--stability": stability, "formation.change_sides_at_s": scenario.formation.change_sides_at_s}
-    for name, given in asked.items():
-        if given:
-            raise UsageError(f"{name} is for a pair, and {scenario.name} has a [{section}]; leave it out")

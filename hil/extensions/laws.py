@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
+from typing import Any
 
 from controllers.own_law import OwnLaw
 from hil.errors import UsageError
@@ -14,8 +16,7 @@ NOUN = "controller.law"
 
 
 @functools.lru_cache(maxsize=64)
-def _law_of(text: str, parameters: tuple[str, ...]) -> OwnLaw:
-    function = loaded(found(text, NOUN))
+def _law_of(function: Callable[..., Any], text: str, parameters: tuple[str, ...]) -> OwnLaw:
     try:
         return OwnLaw(function, short(text), dict.fromkeys(parameters, 0.0))
     except ValueError as error:
@@ -28,4 +29,5 @@ def own_law(text: str, parameters: dict[str, float]) -> OwnLaw:
     Raises :class:`UsageError` as :func:`hil.extensions.reference.found` and
     :func:`~hil.extensions.reference.loaded`, and for a parameter that cannot be one.
     """
-    return _law_of(text, tuple(parameters)).with_parameters(parameters)
+    function = loaded(found(text, NOUN))
+    return _law_of(function, text, tuple(parameters)).with_parameters(parameters)

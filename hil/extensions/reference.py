@@ -112,8 +112,7 @@ def found(text: str, noun: str) -> Found:
         path = Path(place)
         if not path.is_file():
             raise UsageError(f"{noun} {text}: there is no file {path}; give the path of one that is there")
-        module = f"_abreast_{hashlib.sha256(place.encode()).hexdigest()[:_DIGITS]}"
-        return Found(text, noun, path, module, name)
+        return Found(text, noun, path, _module_name(place, path), name)
     path_of_module = _module_file(place)
     if path_of_module is None:
         raise UsageError(
@@ -141,6 +140,15 @@ def loaded(reference: Found) -> Any:
         what = "nothing" if thing is None else f"no function but {type(thing).__name__}"
         raise UsageError(f"{noun} {reference.text}: {reference.name} is {what} there; names in it: {there}")
     return thing
+
+
+def _module_name(place: str, path: Path) -> str:
+    """Name for the module of a file as it is now: one that was edited since is another."""
+    try:
+        source = path.read_bytes()
+    except OSError:
+        source = b""  # told by who loads it
+    return f"_abreast_{hashlib.sha256(place.encode() + source).hexdigest()[:_DIGITS]}"
 
 
 def _module_of(reference: Found) -> ModuleType:

@@ -33,7 +33,7 @@ class NodeWorker:
 
     ``within``: topics on which one of the nodes speaks to another. Such a message goes to its listeners at
     once, and each takes it in at a time of its own, by ``clock`` [ns]; it is published before what they
-    make of it, and nobody here listens to these topics on the wire.
+    make of it, and nobody here listens to these topics on the wire. ``after_tick``: called after every tick.
     """
 
     thorough = False
@@ -44,13 +44,14 @@ class NodeWorker:
         within: Collection[str] = (),
         parting: Parting | None = None,
         clock: Callable[[], int] = time.time_ns,
+        after_tick: Callable[[], None] = lambda: None,
     ) -> None:
         # Listeners first: where all tick at once they have had theirs before they hear, later, of another's.
         self.nodes = tuple(sorted(nodes, key=lambda node: set(within).isdisjoint(node.subscribes)))
         self._readers = _readers(self.nodes)
         self._within = {topic: self._readers[topic] for topic in within if topic in self._readers}
         self.subscribes = tuple(topic for topic in self._readers if topic not in self._within)
-        self._parting, self._clock = parting, clock
+        self._parting, self._clock, self._after_tick = parting, clock, after_tick
         self._states: list[Any] = []
         self._dues: list[int] = []
         self._now_ns = 0
@@ -76,6 +77,7 @@ class NodeWorker:
             for place in self._readers.get(event.topic, ()):
                 yield from self._step(place, event, now_ns)
             return
+        self._after_tick()
         if set_back:
             for place in range(len(self.nodes)):
                 yield from self._step(place, event, now_ns)

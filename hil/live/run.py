@@ -35,8 +35,8 @@ APART = ("recorder", "estimator", "controller", "emulator")
 FOLLOWERS_PER_PROCESS = {"follower": 32, "estimator": 4}
 """A process in Python keeps up with that many at 120 frames a second."""
 
-START_TIMEOUT = 60.0
-"""For the start barrier, from when a daemon was last heard for the first time [s]."""
+START_TIMEOUT = 120.0
+"""For the start barrier, from when a daemon was last heard for the first time [s]: it may have to compile."""
 
 SILENCE = 3.0
 STANDSTILL_TIMEOUT = 10.0

@@ -65,6 +65,14 @@ class Log:
     there are, from ``start_ns`` to ``end_ns`` in log time (both None in a log without messages). ``counts``:
     how many by topic, where the log tells. ``channels``: topic and type name by channel id. ``chunks``: in
     the order of their first messages, none in a log without an index.
+
+    >>> import abreast
+    >>> scenario = abreast.load_scenario("turtlebot3", {"run.duration_s": 2.0})
+    >>> run = abreast.run_lockstep(scenario, log="some.mcap")
+    >>> log = abreast.read_log("some.mcap")
+    >>> first = next(log.records(["rigid_bodies"]))
+    >>> [body.rigid_body_name for body in log.decode(first).rigidbodies]
+    ['leader', 'follower']
     """
 
     path: Path

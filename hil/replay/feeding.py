@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from hil.errors import UsageError
 from hil.log.events import Receipt
 from hil.log.reader import Log
-from hil.scenario.files import load_scenario
+from hil.scenario.files import Overrides, load_scenario, with_overrides
 from hil.scenario.links import Link, refuse_chain
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -48,7 +48,7 @@ def why_edited(consumed: Iterable[Receipt], logged: Iterable[Receipt]) -> str:
     return f"{edited} of the {len(received)} inputs that its estimates rest on have others in their place"
 
 
-def guessed_link(log: Log, leader: str | None, follower: str | None, overrides: Iterable[str] = ()) -> Link:
+def guessed_link(log: Log, leader: str | None, follower: str | None, *changes: Overrides) -> Link:
     """The pair of a log that has our topics but does not say who made it, by the scenario :data:`BASE`.
 
     ``leader``, ``follower``: their names, where the topics and the bodies in the frames leave it open.
@@ -69,10 +69,10 @@ def guessed_link(log: Log, leader: str | None, follower: str | None, overrides: 
             f"log {log.path}: does not say by which scenario it was made, nor who follows whom; give "
             f"--leader and --follower, or name its topics with --map FILE (topics there: {there})"
         )
-    named = [f"leader.name={leader}", f"follower.name={follower}"]
+    named = {"leader.name": leader, "follower.name": follower}
     if topics.RIGID_BODIES not in log.topics:
-        named.append("estimator.front_end=body")
-    scenario = load_scenario(BASE, [*named, *overrides])
+        named["estimator.front_end"] = "body"
+    scenario = with_overrides(base, named, *changes)
     refuse_chain(scenario, "a log without a scenario is taken for that of a pair; leave out what sets chain")
     return Link(scenario)
 

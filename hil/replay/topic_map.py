@@ -7,7 +7,6 @@ A map is a TOML file. ``[topics]`` names the topics, either ``rigid_bodies`` or 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -17,7 +16,7 @@ from msgspec import Struct
 
 from hil.errors import UsageError
 from hil.scenario.checked_toml import checked, locate, read_toml
-from hil.scenario.files import merged_scenario, with_overrides
+from hil.scenario.files import Overrides, merged_scenario, with_overrides
 from hil.scenario.links import refuse_chain
 from hil.scenario.schema import NonNegative, Scenario
 
@@ -69,7 +68,7 @@ def load_topic_map(
     name_or_path: str,
     leader: str | None = None,
     follower: str | None = None,
-    overrides: Iterable[str] = (),
+    *overrides: Overrides,
 ) -> TopicMap:
     """Read a topic map by path.
 
@@ -90,7 +89,7 @@ def load_topic_map(
         raise UsageError(f"{source}: topics: give rigid_bodies, or both of leader_pose and follower_pose")
     if file.topics.rigid_bodies is not None and poses != (None, None):
         raise UsageError(f"{source}: topics: give either rigid_bodies or leader_pose and follower_pose")
-    scenario = with_overrides(merged_scenario(file.scenario, path.stem, f"{source}: scenario"), overrides)
+    scenario = with_overrides(merged_scenario(file.scenario, path.stem, f"{source}: scenario"), *overrides)
     refuse_chain(scenario, "a map names the topics of two robots; leave out what sets chain")
     return TopicMap(
         path=path,

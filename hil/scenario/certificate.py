@@ -15,7 +15,7 @@ from hil.scenario.noise_bounds import NOISE_SIGMAS, position_bound
 from hil.scenario.schema import Scenario, TableProgram
 
 if TYPE_CHECKING:
-    from estimation.bounds.certificate import Certificate, Claim
+    from estimation.bounds.certificate import Certificate
 
 
 def certificate_of(scenario: Scenario, *, driven: bool = True) -> Certificate:
@@ -90,13 +90,8 @@ def _speeds(scenario: Scenario) -> SpeedRange:
 
 
 def certificate_json(certificate: Certificate) -> dict[str, Any]:
-    """JSON of ``abreast bounds``: per claim its figures, ``assumes``, and ``why`` where there are none."""
-    return {name: _claim_json(claim) for name, claim in certificate.claims().items()}
-
-
-def _claim_json(claim: Claim) -> dict[str, Any]:
-    entry: dict[str, Any] = {**claim.figures, "assumes": list(claim.assumes)}
-    return entry if claim.why is None else entry | {"why": claim.why}
+    """JSON of ``abreast bounds``."""
+    return certificate.as_dict()
 
 
 _TITLES = {

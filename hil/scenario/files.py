@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,14 @@ def scenario_names() -> list[str]:
     return shipped_names(_FOLDER)
 
 
-def load_scenario(name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
+Overrides = Iterable[str] | Mapping[str, Any]
+"""What is to be different: texts ``section.key=value``, or values by ``section.key``.
+
+A table in the place of a value is laid over the one that is there, unless it is of a ``kind``.
+"""
+
+
+def load_scenario(name_or_path: str, overrides: Overrides = ()) -> Scenario:
     """Read a scenario by its shipped name or from a TOML file, then apply ``section.key=value`` overrides.
 
     Raises :class:`UsageError` for an unknown name, unreadable TOML, an unknown key (naming the nearest known
@@ -39,13 +46,17 @@ def load_scenario(name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
     return build_scenario(tree, overrides, source=f"scenario {path.stem}")
 
 
-def build_scenario(
-    tree: Mapping[str, Any], overrides: Iterable[str] = (), source: str = "scenario"
-) -> Scenario:
+def build_scenario(tree: Mapping[str, Any], *overrides: Overrides, source: str = "scenario") -> Scenario:
     """Check a tree of plain values (as TOML gives) and turn it into a :class:`Scenario`."""
     merged = msgspec.to_builtins(tree)
-    for override in overrides:
-        _apply(merged, override)
+    for some in overrides:
+        if isinstance(some, Mapping):
+            for key, value in some.items():
+                node, last = _place(merged, key, f"override {key!r}")
+                node.update(_overlaid(node, {last: _plain(value)}))
+        else:
+            for override in some:
+                _apply(merged, override)
     settle_references(merged, Path.cwd())
     scenario = checked(merged, Scenario, source)
     refuse_unknown(scenario, source)
@@ -105,9 +116,9 @@ def scenario_text(scenario: Scenario) -> str:
     return tomli_w.dumps(msgspec.to_builtins(scenario))
 
 
-def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
-    """Return the scenario with ``section.key=value`` overrides applied and checked."""
-    return build_scenario(msgspec.to_builtins(scenario), overrides, source=f"scenario {scenario.name}")
+def with_overrides(scenario: Scenario, *overrides: Overrides) -> Scenario:
+    """Return the scenario with ``section.key=value`` overrides applied, in their order, and checked."""
+    return build_scenario(msgspec.to_builtins(scenario), *overrides, source=f"scenario {scenario.name}")
 
 
 def _overlaid(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
@@ -124,16 +135,52 @@ def _overlaid(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, A
 
 def _apply(tree: dict[str, Any], override: str) -> None:
     key, equals, text = override.partition("=")
-    steps = [step.strip() for step in key.split(".")]
-    if not equals or not all(steps):
+    if not equals:
         raise UsageError(f"--set {override!r}: expected section.key=value, for example mocap.loss=0.05")
     try:
         value = tomllib.loads(f"value = {text}")["value"]
     except (ValueError, RecursionError):
         value = text.strip()
+    node, last = _place(tree, key, f"--set {override!r}")
+    node[last] = value
+
+
+def override_texts(overrides: Overrides) -> tuple[str, ...]:
+    """Overrides as the texts ``section.key=value`` that ``--set`` takes."""
+    if not isinstance(overrides, Mapping):
+        return tuple(overrides)
+    return tuple(f"{key}={_toml(value)}" for key, value in _leaves(_plain(overrides)))
+
+
+def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _toml(value: Any) -> str:
+    return tomli_w.dumps({"value": value}).partition("=")[2].strip()
+
+
+def _place(tree: dict[str, Any], key: str, source: str) -> tuple[dict[str, Any], str]:
+    """The table that a key stands in, made if it is not there, and the key's last part."""
+    steps = [step.strip() for step in key.split(".")]
+    if not all(steps):
+        raise UsageError(f"{source}: expected section.key=value, for example mocap.loss=0.05")
     node: Any = tree
     for step in steps[:-1]:
         node = node.setdefault(step, {})
         if not isinstance(node, dict):
-            raise UsageError(f"--set {override!r}: {step!r} is a value and has no keys below it")
-    node[steps[-1]] = value
+            raise UsageError(f"{source}: {step!r} is a value and has no keys below it")
+    return node, steps[-1]
+
+
+def _plain(value: Any) -> Any:
+    """A value as TOML would give it: numbers and arrays of numpy as Python's."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value.tolist() if hasattr(value, "tolist") else value

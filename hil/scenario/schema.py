@@ -292,7 +292,15 @@ class FlockSection(_Section, frozen=True, kw_only=True):
 
 
 class Scenario(_Section, frozen=True, kw_only=True):
-    """A whole experiment. Build it with :func:`hil.scenario.files.load_scenario`."""
+    """A whole experiment, its sections and their keys as ``docs/scenario.md`` has them; it does not change.
+
+    Build it with :func:`hil.scenario.files.load_scenario`.
+
+    >>> import abreast
+    >>> scenario = abreast.load_scenario("turtlebot3")
+    >>> scenario.formation.rho_0, scenario.estimator.kind
+    (0.2, 'ekf')
+    """
 
     name: str = ""
     description: str = ""

@@ -16,6 +16,7 @@ from hil.judge.chain_pairs import EXACTLY, pair_figures, settling_times
 from hil.scenario import parts as scenario_parts
 from hil.scenario.noise_free_runs import chain_run
 from hil.scenario.schema import Scenario
+from hil.simulate.simulation import Simulation
 from hil.simulate.track_table import write_tracks
 
 SAMPLE_STEP = 0.01
@@ -25,7 +26,7 @@ MOST_CELLS = 20_000_000
 _SHOWN_AFTER, _SHOWN_AT_LEAST = 1.3, 0.25
 
 
-def simulate_chain_of(scenario: Scenario, agents: int, out: Path | None) -> dict[str, object]:
+def simulate_chain_of(scenario: Scenario, agents: int, out: Path | None) -> Simulation:
     """Run a chain of ``agents`` on the exact shape dynamics and report on each pair; ``out`` takes files.
 
     ``pairs``, one for each follower: ``settle_s``, from when on the pair keeps its station
@@ -45,7 +46,17 @@ def simulate_chain_of(scenario: Scenario, agents: int, out: Path | None) -> dict
     if out is not None:
         _write(scenario, trajectory, settled, out)
     pairs = [pair_figures(trajectory, k, settled[k], scenario.controller.v_max) for k in range(agents - 1)]
-    return {"agents": agents, "recovered": all(moment is not None for moment in settled), "pairs": pairs}
+    recovered = all(moment is not None for moment in settled)
+    return Simulation(
+        {"agents": agents, "recovered": recovered, "pairs": pairs},
+        t=trajectory.t,
+        poses=trajectory.poses,
+        v=trajectory.v,
+        u=trajectory.u,
+        rho=trajectory.rho,
+        alpha1=trajectory.alpha1,
+        alpha2=trajectory.alpha2,
+    )
 
 
 def _write(scenario: Scenario, trajectory: ChainTrajectory, settled: list[float | None], out: Path) -> None:

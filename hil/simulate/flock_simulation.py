@@ -19,6 +19,7 @@ from hil.figures.flock_figures import draw_flock
 from hil.judge.chain_pairs import EXACTLY
 from hil.scenario import parts as scenario_parts
 from hil.scenario.schema import FlockSection, Scenario
+from hil.simulate.simulation import Simulation
 from hil.simulate.track_table import write_tracks
 
 _ROUNDING = 1e-6
@@ -34,7 +35,7 @@ class FlockRun:
     files: NDArray[np.int64]
 
 
-def simulate_flock_of(scenario: Scenario, flock: FlockSection, out: Path | None) -> dict[str, object]:
+def simulate_flock_of(scenario: Scenario, flock: FlockSection, out: Path | None) -> Simulation:
     """Run a flock and report on it; with ``out``, write ``trajectory.csv`` and ``flock.png`` there.
 
     ``gathered_s``: when for the first time all agents are in their places (off by at most the share of
@@ -58,7 +59,7 @@ def simulate_flock_of(scenario: Scenario, flock: FlockSection, out: Path | None)
     run = FlockRun(places, trajectory, off, np.rint(distances).astype(np.int64))
     if out is not None:
         _write(scenario, run, out)
-    return _report(scenario, run)
+    return Simulation(_report(scenario, run), trajectory.t, trajectory.poses, trajectory.v, trajectory.u)
 
 
 def _flown(scenario: Scenario, flock: FlockSection) -> tuple[FloatArray, FlockTrajectory]:

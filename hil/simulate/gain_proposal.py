@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from controllers.gain_design import Design, design
@@ -13,6 +13,7 @@ from formation.invariant_set import Disturbed, invariant_set
 from formation.shape import ABREAST_ALPHA2
 from formation.spacing import Spacing
 from hil.errors import UsageError
+from hil.log.report_json import known
 from hil.scenario.certificate import assumptions_of, certificate_of
 from hil.scenario.leader_model import process_noise
 from hil.scenario.parts import limits
@@ -55,22 +56,50 @@ def task_of(scenario: Scenario) -> Task:
     )
 
 
-def propose(scenario: Scenario) -> dict[str, Any]:
-    """JSON of ``abreast gains``: ``gains`` and what they come to, or ``why`` not; ``bounds`` of each gain."""
+@dataclass(frozen=True, slots=True)
+class GainProposal:
+    """Gains proposed for a scenario, or ``why`` none work.
+
+    ``gains``: mu1, mu2 [rad/s], mu_rho [1/m] by name, None if none work. ``bounds``: of each gain ``least``
+    and ``most``, with ``why_least`` and ``why_most``. ``given``: the scenario's own gains.
+    ``phase_margin`` [rad], ``delay_margin_s`` [s] and ``formation`` (``rho_min``, ``rho_max`` [m]), what they
+    come to; None where it is not known.
+
+    >>> import abreast
+    >>> found = abreast.gains("turtlebot3")
+    >>> sorted(found.gains), found.gains["mu1"] > 0.0
+    (['mu1', 'mu2', 'mu_rho'], True)
+    """
+
+    scenario: str
+    gains: Mapping[str, float] | None
+    why: str | None
+    bounds: Mapping[str, Mapping[str, Any]]
+    note: str | None
+    given: Mapping[str, float]
+    phase_margin: float | None = None
+    delay_margin_s: float | None = None
+    formation: Mapping[str, float] | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """The JSON of ``abreast gains``."""
+        result: dict[str, Any] = known(asdict(self))
+        return result
+
+
+def propose(scenario: Scenario) -> GainProposal:
+    """Gains for a scenario, with what bounds each. Raises :class:`UsageError` as :func:`task_of`."""
     task = task_of(scenario)
     found = design(task)
     control = scenario.controller
-    result: dict[str, Any] = {
-        "scenario": scenario.name,
-        "gains": None,
-        "why": found.why,
-        "bounds": {name: asdict(bound) for name, bound in found.bounds.items()},
-        "note": found.note,
-        "given": {"mu1": control.mu1, "mu2": control.mu2, "mu_rho": control.mu_rho},
-    }
-    if found.gains is not None:
-        result |= _outcome(found, found.gains, task)
-    return result
+    return GainProposal(
+        scenario=scenario.name,
+        why=found.why,
+        bounds={name: asdict(bound) for name, bound in found.bounds.items()},
+        note=found.note,
+        given={"mu1": control.mu1, "mu2": control.mu2, "mu_rho": control.mu_rho},
+        **({"gains": None} if found.gains is None else _outcome(found, found.gains, task)),
+    )
 
 
 def _outcome(found: Design, gains: tuple[float, float, float], task: Task) -> dict[str, Any]:
@@ -84,19 +113,19 @@ def _outcome(found: Design, gains: tuple[float, float, float], task: Task) -> di
     }
 
 
-def report_lines(proposal: dict[str, Any]) -> Iterator[str]:
+def report_lines(proposal: GainProposal) -> Iterator[str]:
     """The proposal as lines of text."""
-    gains = proposal["gains"]
+    gains = proposal.gains
     if gains is None:
-        yield f"no gains work: {proposal['why']}"
-    for name, bound in proposal["bounds"].items():
+        yield f"no gains work: {proposal.why}"
+    for name, bound in proposal.bounds.items():
         value = "" if gains is None else f" {gains[name]:g}"
         yield f"{name}{value}: at least {bound['least']:.3g}, for {bound['why_least']}"
         yield f"{' ' * len(name)}  at most {bound['most']:.3g}, for {bound['why_most']}"
-    if gains is not None:
-        margin = math.degrees(proposal["phase_margin"])
-        yield f"phase margin {margin:.0f} deg; {proposal['delay_margin_s']:.2g} s of delay without prediction"
-    if proposal["note"]:
-        yield f"note: {proposal['note']}"
+    if gains is not None and proposal.phase_margin is not None:
+        margin = math.degrees(proposal.phase_margin)
+        yield f"phase margin {margin:.0f} deg; {proposal.delay_margin_s:.2g} s of delay without prediction"
+    if proposal.note:
+        yield f"note: {proposal.note}"
     if gains is not None:
         yield " ".join(f"--set controller.{name}={value:g}" for name, value in gains.items())

@@ -20,6 +20,7 @@ from hil.scenario import parts as scenario_parts
 from hil.scenario.noise_free_runs import follower_law, noise_free_run
 from hil.scenario.ordered_sides import refusal
 from hil.scenario.schema import Scenario
+from hil.simulate.simulation import Simulation
 
 SAMPLE_STEP = 0.005
 MOST_SAMPLES = 200_000
@@ -28,7 +29,7 @@ _COLUMNS = ("t", "rho", "alpha1", "alpha2", "v1", "u1", "v2", "u2")
 _POSE_COLUMNS = ("x", "y", "theta")
 
 
-def simulate(scenario: Scenario, out: Path | None, *, stability: bool = False) -> dict[str, object]:
+def simulate(scenario: Scenario, out: Path | None, *, stability: bool = False) -> Simulation:
     """Run the scenario's law on the exact shape dynamics and report on it; with ``out``, write files there.
 
     The report is the JSON of ``abreast simulate``: ``final`` shape; ``orbit`` of the reduced system, absent
@@ -67,7 +68,16 @@ def simulate(scenario: Scenario, out: Path | None, *, stability: bool = False) -
         report["stability"] = stability_json(found)
         if out is not None:
             _write_stability(scenario, found, out)
-    return report
+    return Simulation(
+        report,
+        t=trajectory.t,
+        poses=np.stack([trajectory.leader, trajectory.follower], axis=1),
+        v=np.column_stack([trajectory.v1, trajectory.v2]),
+        u=np.column_stack([trajectory.u1, trajectory.u2]),
+        rho=trajectory.rho,
+        alpha1=trajectory.alpha1,
+        alpha2=trajectory.alpha2,
+    )
 
 
 def _sample_times(duration: float) -> FloatArray:

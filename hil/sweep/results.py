@@ -70,15 +70,16 @@ def write_table(cells: list[dict[str, Any]], path: Path) -> None:
     import pyarrow
     from pyarrow import parquet
 
-    rows = [dict(_flat(cell)) for cell in cells]
+    rows = [dict(flat(cell)) for cell in cells]
     names = list(dict.fromkeys(name for row in rows for name in row))
     table = pyarrow.table({name: [row.get(name) for row in rows] for name in names})
     parquet.write_table(table, path)
 
 
-def _flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Values with their names; what is nested gets names like ``rmse.v1``."""
     for key, value in tree.items():
         if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{key}.")
+            yield from flat(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", value

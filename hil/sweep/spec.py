@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Annotated, Any
 
@@ -135,23 +135,27 @@ class Sweep:
         return hashlib.sha256(identity).hexdigest()
 
 
-def load_sweep(name_or_path: str, overrides: Sequence[str] = (), **changes: Any) -> Sweep:
-    """Read a specification by its shipped name or from a TOML file; ``changes`` other than None override it.
+def load_sweep(given: str | Mapping[str, Any], overrides: Sequence[str] = (), **changes: Any) -> Sweep:
+    """Read a specification by its shipped name, from a TOML file, or from what would stand in one.
 
-    ``overrides`` of the scenario's keys come after those of the specification, and before those of the cells.
+    ``changes`` other than None override it; ``overrides`` of the scenario's keys come after those of the
+    specification, and before those of the cells.
 
     Raises :class:`UsageError` for whatever is wrong in it, in its scenario, or in any of its cells.
     """
-    path = locate("sweep", "sweeps", name_or_path)
-    tree = read_toml(path, "sweep")
+    if isinstance(given, str):
+        path = locate("sweep", "sweeps", given)
+        source, tree = f"sweep {path.stem}", read_toml(path, "sweep")
+    else:
+        source, tree = "sweep", dict(given)
     tree |= {key: value for key, value in changes.items() if value is not None}
-    spec = checked(tree, SweepSpec, f"sweep {path.stem}")
+    spec = checked(tree, SweepSpec, source)
     estimators = tuple(map(_settled_estimator, spec.estimators))
     spec = msgspec.structs.replace(spec, set=(*spec.set, *overrides), estimators=estimators)
     for estimator in spec.estimators:
         if estimator not in ESTIMATORS and not is_reference(estimator):
             raise UsageError(
-                f"sweep {path.stem}: estimators has {estimator!r}, expected some of: "
+                f"{source}: estimators has {estimator!r}, expected some of: "
                 f"{', '.join(ESTIMATORS)}, or file.py:factory"
             )
     scenario = load_scenario(spec.scenario, [*spec.set, f"run.duration_s={spec.duration_s!r}"])

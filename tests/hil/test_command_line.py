@@ -154,7 +154,7 @@ def main_code(arguments: list[str]) -> object:
 def test_a_run_that_broke_down_says_so_even_without_room_for_a_verdict(
     tmp_path: Path, short_log: Log, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def broken(_scenario: Scenario, _folder: Path, log_path: Path, _listen: str | None) -> str:
+    def broken(_scenario: Scenario, log_path: Path, _live: object) -> str:
         log_path.write_bytes(short_log.path.read_bytes())
         return "the recorder ended"
 

@@ -31,7 +31,7 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def checked(name: str, *overrides: str) -> dict[str, Any]:
-    report = json.loads(as_json(simulate(load_scenario(name, overrides), None, stability=True)))
+    report = json.loads(as_json(simulate(load_scenario(name, overrides), None, stability=True).report))
     found: dict[str, Any] = report["stability"]
     return found
 

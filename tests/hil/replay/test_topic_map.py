@@ -22,7 +22,7 @@ base = "turtlebot3"
 estimator = {{ sigma_position = 0.001 }}
 leader = {{ name = "first", program = {{ kind = "constant", v = 0.1 }} }}
 """
-    chart = load_topic_map(written(tmp_path, text), overrides=["estimator.kind=ukf"])
+    chart = load_topic_map(written(tmp_path, text), None, None, ["estimator.kind=ukf"])
     assert chart.scenario.name == "lab"
     assert chart.scenario.estimator.sigma_position == 0.001
     assert chart.scenario.estimator.kind == "ukf"

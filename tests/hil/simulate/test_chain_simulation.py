@@ -14,7 +14,7 @@ from hil.simulate.chain_simulation import simulate_chain_of
 
 
 def report_of(name: str, *overrides: str, agents: int = 5, out: Path | None = None) -> dict[str, Any]:
-    return simulate_chain_of(load_scenario(name, overrides), agents, out)
+    return simulate_chain_of(load_scenario(name, overrides), agents, out).report
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ from hil.simulate.flock_simulation import simulate_flock_of
 def report_of(*overrides: str, out: Path | None = None) -> dict[str, Any]:
     scenario = load_scenario("flock", overrides)
     assert not isinstance(scenario.flock, msgspec.UnsetType)
-    return simulate_flock_of(scenario, scenario.flock, out)
+    return simulate_flock_of(scenario, scenario.flock, out).report
 
 
 def test_the_shipped_flock_gathers_turns_and_gathers_again() -> None:

@@ -21,7 +21,7 @@ DEGREE = math.pi / 180.0
 
 
 def report_of(name: str, *overrides: str, out: Path | None = None) -> dict[str, Any]:
-    return simulate(load_scenario(name, overrides), out)
+    return simulate(load_scenario(name, overrides), out).report
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +141,7 @@ def test_a_motion_that_breaks_down_is_a_failed_check() -> None:
 
 def test_told_to_change_sides_the_follower_ends_on_the_other() -> None:
     scenario = load_scenario("changing-sides")
-    report: dict[str, Any] = simulate(scenario, None)
+    report: dict[str, Any] = simulate(scenario, None).report
     # Three changes: it ends on the left, where it began on the right.
     assert report["final"]["alpha1"] == pytest.approx(math.pi / 2, abs=0.5)
     assert report["final"]["alpha2"] == pytest.approx(-math.pi / 2, abs=0.1)

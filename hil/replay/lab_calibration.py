@@ -1,0 +1,97 @@
+"""All that a log tells of the lab that it was made in: its timing, and the offsets of its sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from estimation.calibration.sensor_bias import SensorBias
+from estimation.own_motion.input_alignment import Known
+from hil.errors import UsageError
+from hil.log.metadata import scenario_of
+from hil.log.reader import Log
+from hil.log.report_json import known
+from hil.replay.calibration import calibrate
+from hil.replay.timing import VAGUE, Timing, timing_of
+from hil.scenario.links import link_of, refuse_chain
+from hil.scenario.schema import Scenario
+from hil.wire.topics import topics_of
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """What a log tells of its lab.
+
+    ``timing``: times by name, each with ``value`` and ``sd`` [s]: ``lag_s``, ``transport_s``, their sum
+    ``delay_s``, and the correction of stamps, ``stamp_offset_s`` or ``transport_latency_s``. ``unknown``: why
+    something of it is not known, a line each. ``uncertain``: that the correction is too uncertain to be set.
+    ``settings``: scenario keys that put it right. ``offsets``: of a range and bearing sensor, ``range`` [m]
+    and ``bearing`` [rad], each with ``offset``, ``sd`` and ``spread``; None without sightings.
+
+    >>> import abreast
+    >>> scenario = abreast.load_scenario("turtlebot3", {"run.duration_s": 12.0})
+    >>> run = abreast.run_lockstep(scenario, log="lab.mcap")
+    >>> found = abreast.calibrate("lab.mcap")
+    >>> print(f"{found.timing['delay_s'].value:.2f} s")
+    0.10 s
+    """
+
+    timing: Mapping[str, Known]
+    unknown: tuple[str, ...]
+    uncertain: bool
+    settings: Mapping[str, float]
+    offsets: SensorBias | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """The JSON of ``abreast calibrate``."""
+        result: dict[str, Any] = {}
+        for name, found in self.timing.items():
+            result |= {name: found.value, f"{name}_sd": found.sd}
+        if self.settings:
+            result["settings"] = dict(self.settings)
+        if (bias := self.offsets) is not None:
+            result |= {"samples": bias.samples, "outliers": bias.outliers}
+            for name, offset in (("range_bias", bias.range), ("bearing_bias", bias.bearing)):
+                result |= {name: offset.value, f"{name}_sd": offset.sd, f"{name}_spread": offset.spread}
+        cleaned: dict[str, Any] = known(result)
+        return cleaned
+
+
+def calibration_of(
+    log: Log, follower: str | None = None, from_s: float | None = None, to_s: float | None = None
+) -> Calibration:
+    """Calibration by a log, or by its span from ``from_s`` to ``to_s`` [s]; ``follower``: whose, in a chain.
+
+    Raises :class:`UsageError` for a log that is not ours, and for one that tells nothing.
+    """
+    scenario = _scenario_of(log, follower)
+    timing = timing_of(log, scenario, from_s, to_s)
+    sighting = topics_of(scenario).sighting
+    sighted = sighting in log.topics
+    if not (timing.known or sighted):
+        raise UsageError(
+            f"log {log.path}: has no sightings to calibrate (no topic {sighting!r}); "
+            f"{'; '.join(timing.unknown)}"
+        )
+    return Calibration(
+        timing=timing.keys(scenario),
+        unknown=timing.unknown,
+        uncertain=_uncertain(timing),
+        settings=timing.settings(scenario),
+        offsets=calibrate(log, scenario, from_s, to_s) if sighted else None,
+    )
+
+
+def _scenario_of(log: Log, follower: str | None) -> Scenario:
+    whole = scenario_of(log)
+    if whole is None:
+        raise UsageError(f"log {log.path}: was not made by abreast; turn it into one with: abreast import")
+    if follower is not None:
+        return link_of(whole, follower).scenario
+    refuse_chain(whole, "name a follower of it with --follower")
+    return whole
+
+
+def _uncertain(timing: Timing) -> bool:
+    return timing.lateness is not None and timing.lateness.sd >= VAGUE
