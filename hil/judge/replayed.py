@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from hil.errors import UsageError
-from hil.judge.chain_summary import summarise_chain
 from hil.judge.own_motion import judge_own_motion
 from hil.judge.replay_verdict import (
     Played,
@@ -117,6 +116,9 @@ def _with_sources(log: Log, choice: ReplayChoice) -> tuple[Log, tuple[Overrides,
 
 
 def _replayed_chain(log: Log, own: Scenario, choice: ReplayChoice, changes: Sequence[Overrides]) -> Replayed:
+    # Brings integrators along: half a second of imports that a pair has no use for.
+    from hil.judge.chain_summary import summarise_chain
+
     _refuse_leader(choice.leader)
     chosen = with_overrides(own, *changes)
     if choice.verify:
