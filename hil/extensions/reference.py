@@ -12,7 +12,7 @@ import importlib.metadata
 import importlib.util
 import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -21,6 +21,8 @@ from typing import Any
 from hil.errors import UsageError
 
 _DIGITS = 16
+_NAMES = 12
+"""How many names of a module to tell of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +88,12 @@ def short(text: str) -> str:
     return f"{Path(place).name}:{name}" if _is_file(place) else text
 
 
+def told(error: BaseException) -> str:
+    """What somebody's code raised, in one line: its kind, and the first line of what it says, if any."""
+    says = str(error).splitlines()[:1]
+    return ": ".join([type(error).__name__, *says])
+
+
 def settled(text: str, noun: str, group: str, folder: Path) -> str:
     """Reference that means the same anywhere: absolute path of a file, ``module:name`` of an entry point.
 
@@ -129,12 +137,14 @@ def loaded(reference: Found) -> Any:
     noun = reference.noun
     try:
         module = _module_of(reference)
+        thing = getattr(module, reference.name, None)
     except (Exception, SystemExit) as error:  # whatever somebody's file may raise
-        what = f"{type(error).__name__}: {error}".splitlines()[0]
-        raise UsageError(f"{noun} {reference.text}: cannot be loaded ({what}); correct the file") from None
-    thing = getattr(module, reference.name, None)
+        raise UsageError(
+            f"{noun} {reference.text}: cannot be loaded ({told(error)}); correct the file"
+        ) from None
     if not callable(thing):
-        there = ", ".join(name for name in vars(module) if not name.startswith("_")) or "nothing"
+        names = [name for name in vars(module) if not name.startswith("_")]
+        there = ", ".join([*names[:_NAMES], *(["..."] if names[_NAMES:] else [])]) or "nothing"
         what = "nothing" if thing is None else f"no function but {type(thing).__name__}"
         raise UsageError(f"{noun} {reference.text}: {reference.name} is {what} there; names in it: {there}")
     return thing
@@ -175,12 +185,18 @@ def _is_file(place: str) -> bool:
     return place.endswith(".py")
 
 
+def _spec(name: str, path: Sequence[str] | None) -> importlib.machinery.ModuleSpec | None:
+    """What Python would import by a name, by whoever finds it: packages may be installed to be edited."""
+    found = (finder.find_spec(name, path) for finder in sys.meta_path if hasattr(finder, "find_spec"))
+    return next((spec for spec in found if spec is not None), None)
+
+
 def _module_file(name: str) -> Path | None:
     """File of a module, by looking along the path without importing its packages."""
     path = None
     for k, _ in enumerate(parts := name.split("."), 1):
-        spec = importlib.machinery.PathFinder.find_spec(".".join(parts[:k]), path)
+        spec = _spec(".".join(parts[:k]), path)
         if spec is None:
             return None
         path = spec.submodule_search_locations
-    return Path(spec.origin) if spec is not None and spec.origin else None
+    return Path(spec.origin) if spec is not None and spec.has_location and spec.origin else None
