@@ -115,8 +115,8 @@ class FirstClass:
     def _enter(self, asked: int, numbers: int, answer: int) -> int:
         """What compiled code calls where the function could not be compiled."""
         given = _ANSWER.from_address(answer)
-        given[:] = NO_ANSWER  # what stays there if this is interrupted
-        given[:] = self.answer(self._room.from_address(asked)[:], numbers)
+        given[:] = [*NO_ANSWER]  # what stays there if this is interrupted
+        given[:] = [*self.answer(self._room.from_address(asked)[:], numbers)]
         return 0
 
 
