@@ -6,6 +6,7 @@ told from another one of its name before a line of it runs.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib.machinery
 import importlib.metadata
@@ -56,6 +57,8 @@ class _Brought:
 
 
 _BROUGHT: dict[str, _Brought] = {}
+_BROUGHT_FROM_FILES: dict[str, _Brought] = {}
+"""Functions of files that are not run again for them while they stay as they are: of a script, say."""
 
 
 def brought(function: Callable[..., Any]) -> str:
@@ -67,7 +70,10 @@ def brought(function: Callable[..., Any]) -> str:
     module = sys.modules.get(getattr(function, "__module__", None) or "")
     file = getattr(module, "__file__", None)
     if file and file.endswith(".py") and getattr(module, name, None) is function:
-        return f"{Path(file).absolute()}:{name}"
+        text = f"{Path(file).absolute()}:{name}"
+        with contextlib.suppress(OSError):
+            _BROUGHT_FROM_FILES[text] = _Brought(function, Path(file).read_bytes())
+        return text
     try:
         source = inspect.getsource(function).encode()
     except (OSError, TypeError):
@@ -134,6 +140,9 @@ def loaded(reference: Found) -> Any:
     """
     if reference.path is None:
         return _BROUGHT[reference.text].function
+    at_hand = _BROUGHT_FROM_FILES.get(reference.text)
+    if at_hand is not None and hashlib.sha256(at_hand.source).hexdigest()[:_DIGITS] == reference.digest():
+        return at_hand.function
     noun = reference.noun
     try:
         module = _module_of(reference)

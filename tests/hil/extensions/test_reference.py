@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 import importlib.util
 import sys
 from pathlib import Path
@@ -120,9 +121,23 @@ def a_function_in_a_file() -> int:
     return 1
 
 
+def test_a_function_of_a_file_that_was_edited_since_is_taken_from_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "law_at_hand.py").write_text("def law(): return 1\n")
+    module = importlib.import_module("law_at_hand")
+    text = brought(module.law)
+    assert loaded(found(text, "law")) is module.law
+    (tmp_path / "law_at_hand.py").write_text("def law(): return 22\n")
+    assert loaded(found(text, "law"))() == 22
+
+
 def test_a_function_at_hand_is_referred_to_by_its_file_or_kept() -> None:
     text = brought(a_function_in_a_file)
     assert text == f"{Path(__file__).absolute()}:a_function_in_a_file"
+
+    assert loaded(found(text, "law")) is a_function_in_a_file
 
     def inner() -> int:
         return 2
