@@ -149,6 +149,8 @@ def sweep(
     """
     texts = [*override_texts(overrides), *([] if law is None else [f"controller.law={text_of(law)}"])]
     kinds = None if estimators is None else [text_of(each) for each in estimators]
+    if workers < 1:
+        raise UsageError(f"workers is {workers}, expected a number of processes from 1 up")
     if workers > 1 or scheduler is not None:
         _refuse_at_hand([text_of(law), *(kinds or [])])
     given = spec if isinstance(spec, Mapping) else os.fspath(spec)

@@ -95,6 +95,10 @@ def _source(own_motion: str, motion: FloatArray | None) -> str:
 
 def _array(given: ArrayLike, name: str) -> FloatArray:
     try:
+        if np.iscomplexobj(given):
+            raise UsageError(f"{name} is complex, expected real numbers")
+        if np.ma.isMaskedArray(given):
+            return np.array(np.ma.filled(given.astype(np.float64), math.nan))
         return np.array(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise UsageError(f"{name} is no array of numbers ({error})") from None

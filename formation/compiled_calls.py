@@ -102,8 +102,11 @@ def c_function(function: Callable[..., Any], asked: Sequence[type[Any]], numbers
     size = sum(len(kind._fields) for kind in asked)
     second_at = _BYTES * len(asked[0]._fields)
     failed_at = _BYTES * len(numbers._fields)
-    _teach_neighbours(function, set())
-    law = njit(function, error_model=_PYTHON_DIVISION)
+    plain = getattr(function, "py_func", function)  # one that numba has already, by njit
+    if not inspect.isfunction(plain):
+        raise NotCompiledError(f"it is no plain function but {type(function).__name__}")
+    _teach_neighbours(plain, set())
+    law = njit(plain, error_model=_PYTHON_DIVISION)
 
     def entered(asked_at: int, numbers_at: int, answer_at: int) -> int:
         v, u = math.nan, math.nan
@@ -145,9 +148,8 @@ def _as_it_is(function: python.FunctionType) -> Callable[..., Any]:
 
 
 def _in_one_line(error: Exception) -> str:
-    """What numba says about it: the last line that is neither its advice nor a place in a file."""
+    """What numba says about it: the first line that is no stage, no advice and no place in a file."""
     lines = [line.strip() for line in str(error).splitlines()]
-    told = [
-        line for line in lines if line and not line.startswith(("File ", "During", "-", "^", "This error"))
-    ]
-    return " ".join(told[1:2] or told[:1]) or type(error).__name__
+    aside = ("Failed in", "File ", "During", "-", "^", "This error")
+    told = [line for line in lines if line and not line.startswith(aside)]
+    return " ".join((told or lines)[:1]) or type(error).__name__

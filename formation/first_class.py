@@ -10,6 +10,7 @@ what it was asked then, stays behind its numbers, so that :meth:`FirstClass.fail
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import math
 from collections.abc import Callable, Sequence
@@ -68,10 +69,9 @@ class FirstClass:
         """Answer in plain Python; NaN and NaN if there is none, which is counted."""
         record, memory = self._records[numbers]
         try:
-            first, second = self.function(*self._records_of(asked), record)
-            if math.isfinite(first) and math.isfinite(second):
-                return float(first), float(second)
-        except Exception:  # whatever somebody's function may raise
+            if (pair := _pair(self.function(*self._records_of(asked), record))) is not None:
+                return pair
+        except (Exception, SystemExit):  # whatever somebody's function may raise
             pass
         memory[self._own] += 1.0
         memory[self._own + 1 :] = asked
@@ -89,8 +89,11 @@ class FirstClass:
         record, memory = self._records[failed[-1].ctypes.data]
         try:
             answer = self.function(*self._records_of(memory[self._own + 1 :].tolist()), record)
-        except Exception as error:  # whatever somebody's function may raise
-            return f"{type(error).__name__}: {error}"
+        except (Exception, SystemExit) as error:  # whatever somebody's function may raise
+            return " ".join(f"{type(error).__name__}: {error}".split())
+        with contextlib.suppress(Exception):
+            if _pair(answer) is not None:
+                return f"it failed, but gave {answer!r} when asked the same again; it may not have a memory"
         return f"it gave {answer!r}, expected two finite numbers"
 
     def _compile(self, asked: Sequence[type[Any]]) -> None:
@@ -111,5 +114,13 @@ class FirstClass:
 
     def _enter(self, asked: int, numbers: int, answer: int) -> int:
         """What compiled code calls where the function could not be compiled."""
-        _ANSWER.from_address(answer)[:] = [*self.answer(self._room.from_address(asked)[:], numbers)]
+        given = _ANSWER.from_address(answer)
+        given[:] = [*NO_ANSWER]  # what stays there if this is interrupted
+        given[:] = [*self.answer(self._room.from_address(asked)[:], numbers)]
         return 0
+
+
+def _pair(answer: Any) -> tuple[float, float] | None:
+    """An answer as two floats, None if they are not finite. Raises for what is no pair of numbers."""
+    first, second = answer
+    return (float(first), float(second)) if math.isfinite(first) and math.isfinite(second) else None

@@ -10,7 +10,7 @@ import click
 from formation.collector import collector_paused
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
-from hil.log.report_json import print_json
+from hil.log.report_json import print_json, results_apart
 from hil.reports.judged_log import leave, made_folder
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 )
 @click.option("--certify", is_flag=True, help="Judge a guaranteed error radius of every estimate too.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object on stdout.")
+@results_apart()
 @collector_paused()
 def command(
     log: Path,

@@ -16,7 +16,7 @@ from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION
 from hil.errors import CheckFailedError, UsageError
 from hil.judge.made_by import law_failure
-from hil.log.report_json import print_json
+from hil.log.report_json import print_json, results_apart
 from hil.reports.judged_log import claimed, judge_log, made_folder
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario, refuse_unrunnable
@@ -45,6 +45,7 @@ from hil.scenario.schema import Scenario
     "--certify", is_flag=True, help="Publish and judge a guaranteed error radius of every estimate."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object on stdout.")
+@results_apart()
 def command(
     scenario: str,
     duration: float | None,

@@ -9,7 +9,7 @@ import click
 
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION
-from hil.log.report_json import print_json
+from hil.log.report_json import print_json, results_apart
 from hil.scenario.files import load_scenario
 
 
@@ -21,6 +21,7 @@ from hil.scenario.files import load_scenario
 @click.option("--stability", is_flag=True, help="Check the propositions of the paper, too; a pair only.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+@results_apart()
 def command(
     scenario: str,
     law: str | None,

@@ -13,7 +13,7 @@ import click
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
-from hil.log.report_json import print_json
+from hil.log.report_json import print_json, results_apart
 from hil.sweep.spec import Sweep, load_sweep
 
 
@@ -46,6 +46,7 @@ from hil.sweep.spec import Sweep, load_sweep
     "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Folder for results."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the results as one JSON object on stdout.")
+@results_apart()
 def command(
     spec: str,
     runs: int | None,

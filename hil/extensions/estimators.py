@@ -6,18 +6,20 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.filters.belief import Belief, Model
 from estimation.filters.estimator import Estimator, MatrixStep
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import Measurement
 from hil.errors import CheckFailedError, UsageError
-from hil.extensions.reference import found, loaded, short
+from hil.extensions.reference import found, loaded, short, told
 
 GROUP = "abreast.estimators"
 """Entry points by which packages bring estimators."""
 NOUN = "estimator.kind"
 
+_STATES = 5
 _NEEDED = ("start", "predict", "update", "step")
 
 
@@ -57,16 +59,29 @@ class NamedEstimator(Estimator):
     def _done(self, step: Callable[..., Any], *given: Any) -> Any:
         try:
             return step(*given)
-        except Exception as error:  # whatever somebody's estimator may raise
-            what = f"{type(error).__name__}: {error}".splitlines()[0]
-            raise self._failed(f"{step.__name__} raised {what}") from error
+        except (Exception, SystemExit) as error:  # whatever somebody's estimator may raise
+            name = getattr(step, "__name__", type(step).__name__)
+            raise self._failed(f"{name} raised {told(error)}") from error
 
     def _sound(self, belief: Any) -> Belief:
         if not isinstance(belief, Belief):
             raise self._failed(f"it gave {type(belief).__name__}, expected a Belief")
-        if not (np.all(np.isfinite(belief.mean)) and np.all(np.isfinite(belief.covariance))):
-            raise self._failed(f"its belief is not finite: mean {belief.mean.tolist()}")
-        return belief
+        mean = self._kept(belief.mean, "mean", (_STATES,))
+        covariance = self._kept(belief.covariance, "covariance", (_STATES, _STATES))
+        if not (np.all(np.isfinite(mean)) and np.all(np.isfinite(covariance))):
+            raise self._failed(f"its belief is not finite: mean {mean.tolist()}")
+        return belief._replace(mean=mean, covariance=covariance)
+
+    def _kept(self, given: Any, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+        """Numbers of a belief for good: who keeps or gets them cannot change what is gone back to."""
+        try:
+            numbers = np.array(given, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise self._failed(f"its {name} is {given!r}, expected numbers") from None
+        if numbers.shape != shape:
+            raise self._failed(f"its {name} has shape {numbers.shape}, expected {shape}")
+        numbers.flags.writeable = False
+        return numbers
 
     def _failed(self, why: str) -> CheckFailedError:
         return CheckFailedError(f"estimator {self._name} failed: {why}")
@@ -81,9 +96,8 @@ def own_estimator(text: str, model: Model) -> Estimator:
     factory = loaded(found(text, NOUN))
     try:
         made = factory(model)
-    except Exception as error:  # whatever somebody's factory may raise
-        what = f"{type(error).__name__}: {error}".splitlines()[0]
-        raise UsageError(f"{NOUN} {text}: its factory failed ({what}); correct it") from None
+    except (Exception, SystemExit) as error:  # whatever somebody's factory may raise
+        raise UsageError(f"{NOUN} {text}: its factory failed ({told(error)}); correct it") from None
     missing = [name for name in _NEEDED if not callable(getattr(made, name, None))]
     if missing:
         raise UsageError(

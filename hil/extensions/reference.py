@@ -6,12 +6,13 @@ told from another one of its name before a line of it runs.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib.machinery
 import importlib.util
 import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -20,6 +21,8 @@ from typing import Any
 from hil.errors import UsageError
 
 _DIGITS = 16
+_NAMES = 12
+"""How many names of a module to tell of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +56,8 @@ class _Brought:
 
 
 _BROUGHT: dict[str, _Brought] = {}
+_BROUGHT_FROM_FILES: dict[str, _Brought] = {}
+"""Functions of files that are not run again for them while they stay as they are: of a script, say."""
 
 
 def brought(function: Callable[..., Any]) -> str:
@@ -64,7 +69,10 @@ def brought(function: Callable[..., Any]) -> str:
     module = sys.modules.get(getattr(function, "__module__", None) or "")
     file = getattr(module, "__file__", None)
     if file and file.endswith(".py") and getattr(module, name, None) is function:
-        return f"{Path(file).absolute()}:{name}"
+        text = f"{Path(file).absolute()}:{name}"
+        with contextlib.suppress(OSError):
+            _BROUGHT_FROM_FILES[text] = _Brought(function, Path(file).read_bytes())
+        return text
     try:
         source = inspect.getsource(function).encode()
     except (OSError, TypeError):
@@ -83,6 +91,12 @@ def short(text: str) -> str:
     """A reference without the folders of its file."""
     place, _, name = text.rpartition(":")
     return f"{Path(place).name}:{name}" if _is_file(place) else text
+
+
+def told(error: BaseException) -> str:
+    """What somebody's code raised, in one line: its kind, and the first line of what it says, if any."""
+    says = str(error).splitlines()[:1]
+    return ": ".join([type(error).__name__, *says])
 
 
 def settled(text: str, noun: str, group: str, folder: Path) -> str:
@@ -128,15 +142,20 @@ def loaded(reference: Found) -> Any:
     """
     if reference.path is None:
         return _BROUGHT[reference.text].function
+    at_hand = _BROUGHT_FROM_FILES.get(reference.text)
+    if at_hand is not None and hashlib.sha256(at_hand.source).hexdigest()[:_DIGITS] == reference.digest():
+        return at_hand.function
     noun = reference.noun
     try:
         module = _module_of(reference)
+        thing = getattr(module, reference.name, None)
     except (Exception, SystemExit) as error:  # whatever somebody's file may raise
-        what = f"{type(error).__name__}: {error}".splitlines()[0]
-        raise UsageError(f"{noun} {reference.text}: cannot be loaded ({what}); correct the file") from None
-    thing = getattr(module, reference.name, None)
+        raise UsageError(
+            f"{noun} {reference.text}: cannot be loaded ({told(error)}); correct the file"
+        ) from None
     if not callable(thing):
-        there = ", ".join(name for name in vars(module) if not name.startswith("_")) or "nothing"
+        names = [name for name in vars(module) if not name.startswith("_")]
+        there = ", ".join([*names[:_NAMES], *(["..."] if names[_NAMES:] else [])]) or "nothing"
         what = "nothing" if thing is None else f"no function but {type(thing).__name__}"
         raise UsageError(f"{noun} {reference.text}: {reference.name} is {what} there; names in it: {there}")
     return thing
@@ -177,12 +196,18 @@ def _is_file(place: str) -> bool:
     return place.endswith(".py")
 
 
+def _spec(name: str, path: Sequence[str] | None) -> importlib.machinery.ModuleSpec | None:
+    """What Python would import by a name, by whoever finds it: packages may be installed to be edited."""
+    found = (finder.find_spec(name, path) for finder in sys.meta_path if hasattr(finder, "find_spec"))
+    return next((spec for spec in found if spec is not None), None)
+
+
 def _module_file(name: str) -> Path | None:
     """File of a module, by looking along the path without importing its packages."""
     path = None
     for k, _ in enumerate(parts := name.split("."), 1):
-        spec = importlib.machinery.PathFinder.find_spec(".".join(parts[:k]), path)
+        spec = _spec(".".join(parts[:k]), path)
         if spec is None:
             return None
         path = spec.submodule_search_locations
-    return Path(spec.origin) if spec is not None and spec.origin else None
+    return Path(spec.origin) if spec is not None and spec.has_location and spec.origin else None

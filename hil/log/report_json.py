@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextvars import ContextVar
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import click
 import numpy as np
@@ -33,9 +36,26 @@ def as_json(result: Mapping[str, Any], indent: int | None = None) -> str:
     return json.dumps(known(result), indent=indent, allow_nan=False)
 
 
+_results: ContextVar[TextIO | None] = ContextVar("results", default=None)
+
+
+@contextlib.contextmanager
+def results_apart() -> Iterator[None]:
+    """Keep stdout for results: what laws and estimators of others print meanwhile goes to stderr."""
+    if _results.get() is not None:
+        yield
+        return
+    token = _results.set(sys.stdout)
+    try:
+        with contextlib.redirect_stdout(sys.stderr):
+            yield
+    finally:
+        _results.reset(token)
+
+
 def print_json(result: Mapping[str, Any]) -> None:
     """Print a result as one JSON object on one line of stdout."""
-    click.echo(as_json(result))
+    click.echo(as_json(result), file=_results.get())
 
 
 def write_json(result: Mapping[str, Any], path: Path) -> None:

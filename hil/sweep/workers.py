@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import multiprocessing
+import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -28,7 +29,8 @@ def fly_here(sweep: Sweep, pieces: Sequence[Piece], workers: int) -> Iterator[Do
             yield piece, fly_piece(sweep, piece)
         return
     # Spawned processes inherit neither threads nor locks, and numba's code comes out of its cache.
-    pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+    spawn = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(workers, mp_context=spawn, initializer=_leave_stdout)
     try:
         waiting = {pool.submit(fly_piece, sweep, piece): piece for piece in pieces}
         for done in as_completed(waiting):
@@ -39,6 +41,11 @@ def fly_here(sweep: Sweep, pieces: Sequence[Piece], workers: int) -> Iterator[Do
         ) from None
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _leave_stdout() -> None:
+    """Stdout is for results: what laws and estimators of others print in a worker goes to stderr."""
+    sys.stdout = sys.stderr
 
 
 def fly_on_cluster(sweep: Sweep, pieces: Sequence[Piece], scheduler: str) -> Iterator[Done]:

@@ -128,6 +128,20 @@ def test_rows_that_were_not_seen_are_missing_and_nothing_is_shifted(rows: dict[s
     assert np.all(np.abs(found.rho - seen)[~gone] < 0.01)
 
 
+def test_a_masked_row_was_not_seen(rows: dict[str, Any]) -> None:
+    hidden = np.zeros((N, 2), dtype=bool)
+    hidden[200:210] = True
+    masked = abreast.estimate(**{**rows, "leader": np.ma.array(rows["leader"], mask=hidden)})
+    missing = abreast.estimate(**{**rows, "leader": np.where(hidden, math.nan, rows["leader"])})
+    assert np.array_equal(masked.v1, missing.v1, equal_nan=True)
+    assert np.isnan(masked.v1[205])
+
+
+def test_complex_numbers_are_refused(rows: dict[str, Any]) -> None:
+    with pytest.raises(abreast.UsageError, match="leader is complex, expected real numbers"):
+        abreast.estimate(**{**rows, "leader": rows["leader"] + 0j})
+
+
 def test_a_row_that_is_refused_says_why(rows: dict[str, Any]) -> None:
     leader = rows["leader"].copy()
     leader[50] = rows["follower"][50, :2]

@@ -107,3 +107,8 @@ def test_workers_are_not_given_what_only_this_program_has() -> None:
     exec(LAW.format(share=1.0), defined)
     with pytest.raises(abreast.UsageError, match="own is at hand in this program only; put it into a file"):
         abreast.sweep(law=defined["own"], workers=2)
+
+
+def test_no_workers_at_all_are_refused() -> None:
+    with pytest.raises(abreast.UsageError, match="workers is 0, expected a number of processes"):
+        abreast.sweep(workers=0)

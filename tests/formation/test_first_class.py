@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
+import sys
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -71,6 +73,27 @@ def strict(seen: Seen, other: Else, own: Own) -> tuple[float, float]:
     return seen.a, own.k
 
 
+def leaving(seen: Seen, other: Else, own: Own) -> tuple[float, float]:
+    sys.exit("good\nbye")
+
+
+def interrupted(seen: Seen, other: Else, own: Own) -> tuple[float, float]:
+    raise KeyboardInterrupt
+
+
+class Forgetful:
+    """It gives an answer from the second time on, and cannot be hashed."""
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def __call__(self, seen: Seen, other: Else, own: Own) -> tuple[float, float]:
+        self.asked += 1
+        return (math.nan if self.asked < 3 else 1.0), 2.0
+
+
 def first_class(function: Callable[..., Any]) -> FirstClass:
     return FirstClass(function, (Seen, Else), Own)
 
@@ -111,6 +134,8 @@ def test_addresses_of_the_same_numbers_are_the_same() -> None:
         (strict, "ValueError: a is too large"),
         (endless, "it gave (inf, 0.0), expected two finite numbers"),
         (text, "it gave ('left', 'right'), expected two finite numbers"),
+        (leaving, "SystemExit: good bye"),
+        (Forgetful(), "it failed, but gave (1.0, 2.0) when asked the same again; it may not have a memory"),
         (three, "it gave (2.0, 0.5, 0.0), expected two finite numbers"),
     ],
 )
@@ -121,3 +146,23 @@ def test_a_failure_answers_nan_is_counted_and_named(function: Callable[..., Any]
     assert math.isnan(sum_by_address(row_of(at), row_of(whole)))
     assert found.failures() == 2
     assert found.failure() == why
+
+
+@pytest.mark.parametrize("function", [functools.partial(weighed), Forgetful(), math.atan2, Own])
+@pytest.mark.skipif(not compiles(), reason="numba is not in use")
+def test_what_is_no_plain_function_is_asked_in_python(function: Any) -> None:
+    assert first_class(function).why_not == f"it is no plain function but {type(function).__name__}"
+
+
+@pytest.mark.skipif(not compiles(), reason="numba is not in use")
+def test_what_numba_has_already_compiles() -> None:
+    from numba import njit
+
+    assert first_class(njit(weighed)).compiled
+
+
+@pytest.mark.skipif(not compiles(), reason="numba is not in use")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_an_interrupt_leaves_no_answer_behind() -> None:
+    found = first_class(interrupted)
+    assert math.isnan(sum_by_address(row_of(found.at(1.0)), row_of(Whole(2.0, 0.5, 0.0))))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from controllers.own_law import OwnLaw
 from formation.kernel import compiles
 from formation.shape import Shape
 from formation.spacing import Spacing
+from hil.command_line import main
 from hil.commands.own_parts import load_own_parts, remarks_on
 from hil.errors import UsageError
 from hil.scenario.files import load_scenario
@@ -56,3 +58,18 @@ def test_what_runs_interpreted_is_said_before_anything_drives(
     assert estimator == "estimator parts_of_ones_own.py:ExtendedFilter runs interpreted"
     with pytest.raises(UsageError, match="none is nothing there"):
         load_own_parts(load_scenario("turtlebot3", [f"controller.law={file}:none"]))
+
+
+def test_what_a_law_prints_is_no_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "loud_law.py"
+    file.write_text(
+        "print('loud at import')\n"
+        "def law(shape, leader, gains):\n    print('asked', {})\n    return 0.1, 0.0\n"
+    )
+    with pytest.raises(SystemExit) as ended:
+        main(["simulate", "--law", f"{file}:law", "--duration", "0.1", "--json"])
+    said = capsys.readouterr()
+    assert ended.value.code == 0
+    assert json.loads(said.out)["final"]["rho"] > 0.0
+    assert "loud at import" in said.err
+    assert "asked {}" in said.err

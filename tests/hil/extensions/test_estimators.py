@@ -38,6 +38,28 @@ class Plain(ExtendedFilter):
     def start(self, measurement):
         return measurement
 
+class Leaving(ExtendedFilter):
+    def predict(self, belief, dt, follower):
+        raise SystemExit("done")
+
+class Short(ExtendedFilter):
+    def update(self, belief, measurement):
+        return belief._replace(mean=belief.mean[:4])
+
+class Wordy(ExtendedFilter):
+    def update(self, belief, measurement):
+        return belief._replace(covariance="small")
+
+class InPlace(ExtendedFilter):
+    def predict(self, belief, dt, follower):
+        belief.mean[0] += dt
+        return belief
+
+class Lists(ExtendedFilter):
+    def start(self, measurement):
+        self.kept = super().start(measurement)
+        return self.kept._replace(mean=self.kept.mean.tolist())
+
 def wrong(model):
     raise ValueError("no such model")
 
@@ -57,6 +79,10 @@ def file(tmp_path: Path) -> Path:
     ("name", "why"),
     [
         ("Raising", "predict raised KeyError: 'nothing'"),
+        ("Leaving", "predict raised SystemExit: done"),
+        ("Short", r"its mean has shape \(4,\), expected \(5,\)"),
+        ("Wordy", "its covariance is 'small', expected numbers"),
+        ("InPlace", "predict raised ValueError: assignment destination is read-only"),
         ("Endless", r"its belief is not finite: mean \[nan"),
     ],
 )
@@ -65,6 +91,16 @@ def test_what_it_raises_and_what_is_no_belief_bear_its_name(file: Path, name: st
     belief = estimator.start(SEEN)
     with pytest.raises(CheckFailedError, match=f"estimator estimators_to_test.py:{name} failed: {why}"):
         estimator.update(estimator.predict(belief, 0.01, STILL), SEEN)
+
+
+def test_a_belief_is_kept_as_it_was_given(file: Path) -> None:
+    estimator = own_estimator(f"{file}:Lists", MODEL)
+    belief = estimator.start(SEEN)
+    inner = estimator._estimator  # type: ignore[attr-defined]
+    was = belief.covariance.copy()
+    inner.kept.covariance[0, 0] = 7.0
+    assert np.array_equal(belief.covariance, was)
+    assert isinstance(belief.mean, np.ndarray)
 
 
 def test_a_step_that_is_none_bears_its_name(file: Path) -> None:

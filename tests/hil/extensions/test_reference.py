@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
+import importlib.util
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -75,6 +78,38 @@ def test_what_is_not_there_is_named(tmp_path: Path) -> None:
         loaded(found(f"{file}:third", "law"))
 
 
+def test_few_names_of_many_are_told_and_a_file_that_answers_for_names_may_fail(tmp_path: Path) -> None:
+    many, odd = tmp_path / "many_names.py", tmp_path / "odd_names.py"
+    many.write_text("\n".join(f"name_{k} = 0" for k in range(30)))
+    with pytest.raises(UsageError, match=r"names in it: name_0, .*name_11, \.\.\.$"):
+        loaded(found(f"{many}:law", "law"))
+    odd.write_text("__getattr__ = None\n")
+    with pytest.raises(UsageError, match=r"odd_names.py:law: cannot be loaded \(TypeError: "):
+        loaded(found(f"{odd}:law", "law"))
+
+
+class _Finder:
+    """As of a package that was installed to be edited: it is on nobody's path."""
+
+    def __init__(self, name: str, file: Path) -> None:
+        self.name, self.file = name, file
+
+    def find_spec(self, name: str, path: Any, target: Any = None) -> Any:
+        return importlib.util.spec_from_file_location(name, self.file) if name == self.name else None
+
+
+def test_a_module_is_found_by_whoever_finds_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "elsewhere.py"
+    file.write_text("def law(): return 5\n")
+    monkeypatch.setattr(sys, "meta_path", [*sys.meta_path, _Finder("laws_to_edit", file)])
+    reference = found("laws_to_edit:law", "law")
+    assert reference.path == file
+    assert "laws_to_edit" not in sys.modules
+    assert loaded(reference)() == 5
+    with pytest.raises(UsageError, match="there is no module builtins"):
+        found("builtins:len", "law")
+
+
 def test_a_file_finds_its_neighbours(tmp_path: Path) -> None:
     (tmp_path / "neighbour_of_a_law.py").write_text("value = 7\n")
     file = tmp_path / "with_neighbour.py"
@@ -86,9 +121,23 @@ def a_function_in_a_file() -> int:
     return 1
 
 
+def test_a_function_of_a_file_that_was_edited_since_is_taken_from_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "law_at_hand.py").write_text("def law(): return 1\n")
+    module = importlib.import_module("law_at_hand")
+    text = brought(module.law)
+    assert loaded(found(text, "law")) is module.law
+    (tmp_path / "law_at_hand.py").write_text("def law(): return 22\n")
+    assert loaded(found(text, "law"))() == 22
+
+
 def test_a_function_at_hand_is_referred_to_by_its_file_or_kept() -> None:
     text = brought(a_function_in_a_file)
     assert text == f"{Path(__file__).absolute()}:a_function_in_a_file"
+
+    assert loaded(found(text, "law")) is a_function_in_a_file
 
     def inner() -> int:
         return 2
