@@ -12,6 +12,7 @@ from estimation.own_motion.odometry_correction import (
     with_pose,
     with_sample,
 )
+from estimation.own_motion.odometry_history import MotionSample
 from estimation.time.host_time import HostTime
 from estimation.tracking.estimate import Estimate
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE
@@ -19,8 +20,10 @@ from formation.records import load
 from hil.nodes.certifying import Believed, certifying
 from hil.nodes.estimator_inputs import RESTARTED, SEEN, SET_BACK, TICK_NS
 from hil.nodes.estimator_memory import EstimatorMemory, node_rules
+from hil.nodes.estimator_step import AUTO, MOCAP, Known, is_under_way
 from hil.nodes.frame_time import clock_report
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
+from hil.nodes.odometry_findings import FINDING, odometry_findings
 from hil.nodes.sensor_offsets import offsets_report
 from hil.scenario.files import refuse_unrunnable
 from hil.scenario.schema import Scenario
@@ -171,7 +174,9 @@ class EstimatorNode:
         if came != SEEN and not self._is_seen(state, came):
             return 0
         if self.aligns:
-            state.comparison = with_sample(state.comparison, memory.sample)
+            told = memory.sample
+            sample = MotionSample(told.stamp_ns, told.v2, told.u2)
+            state.comparison = with_sample(state.comparison, sample)
         memory.take_odometry()
         return 0
 
@@ -207,8 +212,7 @@ class EstimatorNode:
     def report(self, state: EstimatorState, now_ns: int) -> Outgoing:
         """Diagnostics: status of the track, inputs taken and refused."""
         known = state.memory.known
-        moving = known.own if self.scenario.estimator.own_motion == "mocap" else known.odometry
-        problem = "" if known.track.length and moving.length else "waiting for mocap and odometry"
+        problem = "" if is_under_way(known, self.rules.step) else self._missing(known)
         values: dict[str, object] = {"status": state.memory.status(now_ns).name.lower()}
         values |= clock_report(state.times, state.memory.desk.time)
         values |= (
@@ -219,5 +223,14 @@ class EstimatorNode:
         if self.aligns:
             applied = state.comparison.applied._asdict()
             values |= {f"odometry.{name}": value for name, value in applied.items()}
+        found = odometry_findings(known, self.rules.step, now_ns)
+        values |= {FINDING + name: text for name, text in found.items()}
         values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
+
+    def _missing(self, known: Known) -> str:
+        """What the estimator waits for to begin."""
+        seen = "sightings" if self.rules.sensor.used and known.own.length == 0 else "mocap"
+        if known.track.length == 0 and self.rules.step.source in (MOCAP, AUTO):
+            return f"waiting for {seen}"
+        return f"waiting for {seen} and odometry"
