@@ -8,6 +8,7 @@ from estimation.models.coordinated_turn import FollowerMotion
 from estimation.own_motion.odometry_check import (
     OdometryCheck,
     SourceCheck,
+    Sums,
     WayEntry,
     awaits_track,
     way_entry,
@@ -90,7 +91,8 @@ def _doubted(
         if doubt > _DOUBTS:
             return check
         # What has told of another moment is not trusted at once, even if it now looks well.
-        return check._replace(late=0.0, by_twist=SourceCheck(0.0, 0, False))
+        sums = Sums(0.0, 0.0, 0.0, 0.0)
+        return check._replace(late=0.0, by_twist=SourceCheck(0.0, 0, False), v=sums, u=sums)
     return check._replace(late=late)
 
 

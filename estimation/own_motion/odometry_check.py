@@ -34,6 +34,7 @@ _SMALL, _LARGE = 9.21, 27.63  # chi-square quantiles of 0.99 and 0.999999 with 2
 _REFUTED = 18.42  # their difference, also the quantile of 0.9999: no single window reaches it
 _BORNE_OUT = 4  # windows
 _FORGETS = 0.8  # share of sums that is left after a window
+_ALIKE = 0.8  # squared correlation above which a channel is the motion by another scale
 _GAP = 1.0  # [s] without a sample or a pose, over which nothing is added up
 _HALF_SMALL = 1e-6
 _NS = 1e-9
@@ -317,7 +318,9 @@ def _judged(check: OdometryCheck, after: WayEntry, noise: OwnNoise, trust: Input
     tells = _square(track.v, variance.v) + _square(track.u, variance.u) > _SMALL
     if not check.by_twist.trusted:
         # Of a scale of 1.3, say, a robot that creeps tells nothing.
-        off_v, off_u = _off_by(check.v) * track.v, _off_by(check.u) * track.u
+        v, u = check.v.misfit > _SMALL, check.u.misfit > _SMALL
+        off_v = _off_by(check.v) * track.v if v or not u else 0.0
+        off_u = _off_by(check.u) * track.u if u or not v else 0.0
         tells = _square(off_v, variance.v) + _square(off_u, variance.u) > _SMALL
     by_twist = _with_window(check.by_twist, misfit_v + misfit_u, tells)
     by_pose = check.by_pose
@@ -337,8 +340,11 @@ def _judged(check: OdometryCheck, after: WayEntry, noise: OwnNoise, trust: Input
 
 @kernel
 def _off_by(sums: Sums) -> float:
-    """By how much of the true motion a refuted channel is off."""
-    return sums.both / sums.shown - 1.0 if sums.shown > 0.0 else 0.0
+    """By how much of the true motion a refuted channel is off: its scale, or all of it if it is none."""
+    if sums.both * sums.both < _ALIKE * sums.told * sums.shown or sums.shown <= 0.0:
+        return -1.0
+    off = sums.both / sums.shown - 1.0
+    return off if abs(off) > 2.0 * SCALE else -1.0
 
 
 @kernel
