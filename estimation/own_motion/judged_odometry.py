@@ -7,10 +7,9 @@ import math
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.own_motion.odometry_check import (
     OdometryCheck,
-    SourceCheck,
-    Sums,
     WayEntry,
     awaits_track,
+    no_sums,
     way_entry,
     window_of,
     with_track,
@@ -91,8 +90,8 @@ def _doubted(
         if doubt > _DOUBTS:
             return check
         # What has told of another moment is not trusted at once, even if it now looks well.
-        sums = Sums(0.0, 0.0, 0.0, 0.0)
-        return check._replace(late=0.0, by_twist=SourceCheck(0.0, 0, False), v=sums, u=sums)
+        by_twist = check.by_twist._replace(excess=0.0, borne_out=0, trusted=False)
+        return check._replace(late=0.0, by_twist=by_twist, v=no_sums(), u=no_sums())
     return check._replace(late=late)
 
 
