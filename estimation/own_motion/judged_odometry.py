@@ -27,8 +27,8 @@ from formation.ring import Ring
 _APART = 0.3  # [s]; two poses further apart tell nothing of the moment in between
 _DOUBTS = 9.21  # chi-square quantile of 0.99 with 2 degrees of freedom, of a mean: far above any healthy one
 _NS = 1e-9
-FRESH = 2.0
-"""Periods of odometry within which a sample has not aged."""
+_FRESH = 2.0  # periods of odometry
+_FIRST_PERIOD = 0.1  # [s] that is taken for granted while a sample is the only one
 
 
 @kernel(inline=False)
@@ -102,13 +102,19 @@ def age_of(check: OdometryCheck, capture_ns: int, trust: InputTrust) -> float:
 
 
 @kernel
+def fresh_for(check: OdometryCheck) -> float:
+    """How long [s] a sample is as good as new: two periods of odometry."""
+    return _FRESH * (check.period if check.period > 0.0 else _FIRST_PERIOD)
+
+
+@kernel
 def aged(motion: FollowerMotion, check: OdometryCheck, age: float, noise: OwnNoise) -> FollowerMotion:
     """Motion by a sample of an age [s]: since then the robot may have changed it.
 
     As on the track, v and u are driven by white noise of v_max^2 and u_max^2 per second, from two periods of
     odometry on.
     """
-    over = age - FRESH * check.period
+    over = age - fresh_for(check)
     if over <= 0.0:
         return motion
     sd_v = math.sqrt(motion.sd_v2 * motion.sd_v2 + noise.v_max * noise.v_max * over)

@@ -17,7 +17,7 @@ from estimation.models.measurement import (
     measure_body_from_mocap,
     measure_world,
 )
-from estimation.own_motion.judged_odometry import FRESH, age_of, aged, is_better, with_own_track
+from estimation.own_motion.judged_odometry import age_of, aged, fresh_for, is_better, with_own_track
 from estimation.own_motion.odometry_check import (
     POSE,
     TRACK,
@@ -176,7 +176,7 @@ def _is_fresh(known: Known, rules: Rules, capture_ns: int) -> bool:
     """Whether odometry is believed and covers a capture."""
     check = known.odometry_check
     age = age_of(check, capture_ns, rules.trust)
-    return check.heard and source_of(check) != TRACK and age <= FRESH * check.period
+    return check.heard and source_of(check) != TRACK and age <= fresh_for(check)
 
 
 @kernel

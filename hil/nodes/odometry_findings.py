@@ -36,7 +36,7 @@ def odometry_findings(known: Known, rules: Rules, now_ns: int) -> dict[str, str]
         return found
     if age > max(_SILENT_S, _PERIODS * check.period):
         if not found:
-            found["odometry_silent"] = f"newest odometry is {age:.1f} s old{_rate(check)}{_instead(known)}"
+            found["odometry_silent"] = f"newest odometry is {age:.1f} s old{_rate(check)}{_in_silence(known)}"
         return found
     if check.late != 0.0:
         way = "late" if check.late > 0.0 else "ahead of the motion, as commands are,"
@@ -60,6 +60,12 @@ def _instead(known: Known) -> str:
     if known.own.length == 0:
         return "; there is no mocap track to take instead"
     return "; the mocap track is taken instead" if source == TRACK else ""
+
+
+def _in_silence(known: Known) -> str:
+    if known.own.length == 0:
+        return "; there is no mocap track to take instead, and its deviation grows"
+    return "; the mocap track is taken instead"
 
 
 def _contradiction(check: OdometryCheck) -> str:
