@@ -16,7 +16,7 @@ from estimation.own_motion.odometry_check import (
     without_track,
 )
 from estimation.own_motion.odometry_delay import delay_of, misfit_of, tight_variances
-from estimation.own_motion.odometry_history import IDEAL, InputTrust, delay_ns
+from estimation.own_motion.odometry_history import InputTrust
 from estimation.own_motion.own_track import OwnNoise, OwnPoint, own_place, own_point
 from formation.angles import wrapped
 from formation.kernel import kernel
@@ -41,7 +41,7 @@ def with_own_track(
     trust: InputTrust,
 ) -> OdometryCheck:
     """Check with all that the track now tells of the moments at which odometry was added up."""
-    later_ns = delay_ns(trust, IDEAL)
+    later_ns = lateness_ns(trust)
     while awaits_track(check):
         at_ns = way_entry(entries, check.entries, check.paired).stamp_ns + later_ns
         k = own_place(own, ring, at_ns)
@@ -96,9 +96,15 @@ def _doubted(
 
 
 @kernel
+def lateness_ns(trust: InputTrust) -> int:
+    """By how much the motion comes after its signal [ns]."""
+    return math.floor(trust.delay / _NS + 0.5)
+
+
+@kernel
 def age_of(check: OdometryCheck, capture_ns: int, trust: InputTrust) -> float:
     """How long [s] before a capture the motion was of which the newest sample tells; 0 if it was not."""
-    return max(0.0, (capture_ns - check.last.stamp_ns - delay_ns(trust, IDEAL)) * _NS)
+    return max(0.0, (capture_ns - check.last.stamp_ns - lateness_ns(trust)) * _NS)
 
 
 @kernel
