@@ -17,6 +17,7 @@ from hil.judge.certified import judge_certified
 from hil.judge.clock import arrival_rows, judge_clock
 from hil.judge.columns import Columns, columns_of
 from hil.judge.estimation import judge_estimation
+from hil.judge.findings import findings_list
 from hil.judge.formation import judge_formation
 from hil.judge.made_by import law_json
 from hil.judge.run_data import RunData
@@ -37,7 +38,8 @@ def summarise(run_data: RunData) -> dict[str, Any]:
     strangers do not count. ``commands``: those from when the leader set off to the stop. ``seed`` and ``law``
     are absent for recordings that were not driven by them. ``certified``: only where estimates are certified.
     ``law``: a name, of one's own more (:func:`hil.judge.made_by.law_json`).
-    ``orders_refused``: why the scenario's own orders to change sides were, if they were.
+    ``findings``: what nodes found to be wrong, and the judge (:mod:`hil.judge.findings`); absent where nobody
+    could have told. ``orders_refused``: why the scenario's own orders to change sides were, if they were.
     ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it.
     """
     columns = columns_of(run_data)
@@ -60,6 +62,7 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "clock": judge_clock(arrival_rows(run_data)),
         "commands": _commands(columns),
         "orders_refused": refusal(given) if driven else None,
+        "findings": findings_list(run_data.found),
         "rejected": dict(run_data.refused),
         "log": None if run_data.log is None else asdict(run_data.log),
     }

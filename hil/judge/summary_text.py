@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from hil.judge.made_by import law_failure, made_by
+from hil.nodes.findings import finding_line
 
 GOOD, BAD, PLAIN = "green", "bold red", ""
 LEAST_COVERAGE = 0.97
@@ -49,6 +50,7 @@ def warnings_of(summary: Mapping[str, Any]) -> list[str]:
         *_formation_warnings(summary),
         *_wire_warnings(summary),
         *filter(None, [law_failure(summary)]),
+        *map(finding_line, summary.get("findings", [])),
     ]
 
 

@@ -19,6 +19,7 @@ from formation.records import load
 from hil.nodes.certifying import Believed, certifying
 from hil.nodes.estimator_inputs import RESTARTED, SEEN, SET_BACK, TICK_NS
 from hil.nodes.estimator_memory import EstimatorMemory, node_rules
+from hil.nodes.findings import Findings, named_findings
 from hil.nodes.frame_time import clock_report
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
 from hil.nodes.sensor_offsets import offsets_report
@@ -220,4 +221,12 @@ class EstimatorNode:
             applied = state.comparison.applied._asdict()
             values |= {f"odometry.{name}": value for name, value in applied.items()}
         values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)
+        values |= named_findings(self.findings(state, now_ns))
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
+
+    def findings(self, state: EstimatorState, now_ns: int) -> Findings:
+        """What is wrong with what the estimator gets, as long as it is; reads rows, and takes no step.
+
+        A replay in one pass asks too, and has loaded none of the node's own steps.
+        """
+        return {}

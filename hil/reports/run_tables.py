@@ -68,6 +68,7 @@ _HEAD = (
     "log.path",
     "log.messages",
     "log.bytes",
+    "findings",
 )
 """What the head of the page says."""
 

@@ -77,6 +77,7 @@ def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
         "estimator",
         "law",
         "duration_s",
+        "findings",
     }
     for name in ("rmse", "max", "efficiency", "coverage_3sigma"):
         assert set(judged["estimation"][name]) == QUANTITIES
