@@ -30,9 +30,14 @@ def found_again(
     return dict(all_found([again, kept]))
 
 
-def findings_list(found: Mapping[str, Findings] | None) -> list[dict[str, Any]] | None:
-    """The ``findings`` of a summary, one of a name, None where nobody could have told."""
-    if found is None:
+def findings_list(
+    found: Mapping[str, Findings] | None, judged: Findings | None
+) -> list[dict[str, Any]] | None:
+    """The ``findings`` of a summary, one of a name, None where nobody could have told.
+
+    ``judged``: what the judge finds itself, None where it cannot.
+    """
+    if found is None and judged is None:
         return None
-    merged = {name: text for findings in found.values() for name, text in findings.items()}
-    return findings_json(merged)
+    merged = {name: text for findings in (found or {}).values() for name, text in findings.items()}
+    return findings_json({**merged, **(judged or {})})

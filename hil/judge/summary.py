@@ -16,6 +16,7 @@ from hil.judge.bounds import judge_bounds
 from hil.judge.certified import judge_certified
 from hil.judge.clock import arrival_rows, judge_clock
 from hil.judge.columns import Columns, columns_of
+from hil.judge.consistency import judged_findings
 from hil.judge.estimation import judge_estimation
 from hil.judge.findings import findings_list
 from hil.judge.formation import judge_formation
@@ -45,6 +46,7 @@ def summarise(run_data: RunData) -> dict[str, Any]:
     columns = columns_of(run_data)
     given = run_data.scenario
     driven = run_data.motion_since_ns is not None
+    estimation = judge_estimation(run_data, columns)
     summary = {
         "scenario": given.name,
         "seed": given.run.seed if driven else None,
@@ -53,7 +55,7 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "law": law_json(given, run_data.law) if driven or len(columns.commands.issued_ns) else None,
         "duration_s": columns.run.seconds,
         "frames": _frames(run_data),
-        "estimation": judge_estimation(run_data, columns),
+        "estimation": estimation,
         "bounds": judge_bounds(given, columns) | judge_assumptions(given, columns),
         "certified": judge_certified(run_data.certified, columns.truth, columns.span),
         "certificate": run_data.certificate or certificate_json(certificate_of(given, driven=driven)),
@@ -62,7 +64,7 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "clock": judge_clock(arrival_rows(run_data)),
         "commands": _commands(columns),
         "orders_refused": refusal(given) if driven else None,
-        "findings": findings_list(run_data.found),
+        "findings": findings_list(run_data.found, judged_findings(estimation)),
         "rejected": dict(run_data.refused),
         "log": None if run_data.log is None else asdict(run_data.log),
     }

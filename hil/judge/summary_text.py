@@ -96,6 +96,7 @@ def _estimate_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]
     if parts:
         judged = f"({estimation['samples']} samples from {estimation['evaluated_from_s']:.3g} s on)"
         yield "estimate", f"RMSE {', '.join(parts)} {judged}", PLAIN
+    yield from _nees_line(estimation)
     if "violations" in bounds:
         broken = extended_violations(summary)
         shares = [value for name, value in bounds["tightness"].items() if name.endswith("_extended")]
@@ -103,6 +104,17 @@ def _estimate_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]
         count = f"{sum(broken.values())} times" if broken else "nowhere"
         verdict = f"extended ones violated {count} in {bounds['checked']} samples{tight}"
         yield "bounds", verdict, BAD if broken else GOOD
+
+
+def _nees_line(estimation: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    limits = estimation.get("nees_limits", {})
+    parts = []
+    for name in ("v1", "alpha1", "u1"):
+        if name in limits:
+            low, high = limits[name]
+            parts.append(f"{name} {estimation['nees'][name]:.2f} ({low:.2f} to {high:.2f})")
+    if parts:
+        yield "nees", f"squared errors over their variances: {', '.join(parts)}", PLAIN
 
 
 def _certified_line(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:

@@ -47,15 +47,20 @@ def log_of_found(found_early: None, tmp_path: Path) -> Log:
     return read_log(path)
 
 
+def by_nodes(summary: dict[str, Any]) -> list[dict[str, str]]:
+    """Findings without those of the judge itself."""
+    return [each for each in summary["findings"] if each["name"] != "nees"]
+
+
 def names(summary: dict[str, Any]) -> list[str]:
-    return [each["name"] for each in summary["findings"]]
+    return [each["name"] for each in by_nodes(summary)]
 
 
 def test_what_was_found_for_a_while_is_in_the_verdict_of_run_and_replay(
     log_of_found: Log, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     summary = summarise(run_data_of_log(log_of_found))
-    (found,) = summary["findings"]
+    (found,) = by_nodes(summary)
     assert found == {"name": "odometry_silent", "text": "no odometry for 1 s", "advice": found["advice"]}
     assert found["advice"] == advice_on("odometry_silent")
     assert [line for line in warnings_of(summary) if "no odometry for 1 s" in line]
@@ -72,9 +77,9 @@ def test_what_was_found_for_a_while_is_in_the_verdict_of_run_and_replay(
 def test_a_run_in_which_nothing_was_found_says_so_and_one_without_diagnostics_does_not(
     short_log: Log, exact_run_data: RunData
 ) -> None:
-    assert summarise(run_data_of_log(short_log))["findings"] == []
-    assert "findings" not in summarise(exact_run_data)
-    assert summarise(replace(exact_run_data, found={}))["findings"] == []
+    assert by_nodes(summarise(run_data_of_log(short_log))) == []
+    assert "findings" not in summarise(replace(exact_run_data, truth=[]))
+    assert summarise(replace(exact_run_data, truth=[], found={}))["findings"] == []
 
 
 def test_each_follower_of_a_chain_has_its_own_and_those_of_nobody() -> None:
@@ -95,5 +100,5 @@ def test_a_replay_with_other_steps_does_not_know_what_was_found_live() -> None:
     other = found_again(logged, again, Link(PAIR), same=False)
     assert other == {"estimator": {"noise": "twice"}, "recorder": {"disk": "full"}}
     assert found_again(None, again, Link(PAIR), same=False) == again
-    assert findings_list(None) is None
-    assert [each["name"] for each in findings_list(other) or ()] == ["noise", "disk"]
+    assert findings_list(None, None) is None
+    assert [each["name"] for each in findings_list(other, None) or ()] == ["noise", "disk"]
