@@ -113,11 +113,11 @@ class ImpulseProgram(_Section, frozen=True, kw_only=True, tag="impulse", tag_fie
 class TableProgram(_Section, frozen=True, kw_only=True, tag="table", tag_field="kind"):
     """Speed v and turn rate u at the times t, linear in between and held at the ends.
 
-    No leader drives backwards: of who is seen by its positions the direction of motion is the heading.
+    With v < 0 the leader drives backwards: alpha1 is that of its direction of travel, and v1 = abs(v).
     """
 
     t: list[float]
-    v: list[NonNegative]
+    v: list[float]
     u: list[float]
 
 

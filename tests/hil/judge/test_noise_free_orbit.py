@@ -90,3 +90,23 @@ def test_nothing_to_go_by_gives_no_orbit() -> None:
     unknown = replace(truth, v1=np.full(61, math.nan))
     assert noise_free_orbit(scenario, unknown, span) is None
     assert noise_free_orbit(scenario, truth, Span(0, 1)) is None
+
+
+def test_a_leader_that_backs_up_has_an_orbit_and_one_that_turns_back_has_none() -> None:
+    scenario = load_scenario("turtlebot3")
+    run = noise_free_run(scenario, np.linspace(0.0, 6.0, 361))
+    truth, span = truth_and_span(run)
+    orbit = noise_free_orbit(scenario, truth, span)
+    # It stands at first, and is told of by its heading until it backs up.
+    standing, v1, leader = np.arange(361) < 1, truth.v1.copy(), truth.leader.copy()
+    v1[standing] = 0.0
+    leader[standing, 2] += math.pi
+    alpha1 = np.where(standing, truth.alpha1 - math.pi, truth.alpha1)
+    backing_up = noise_free_orbit(scenario, replace(truth, v1=v1, leader=leader, alpha1=alpha1), span)
+    assert orbit is not None
+    assert backing_up is not None
+    # The same but for the first half step, in which it speeds up.
+    assert np.max(np.abs(backing_up.rho - orbit.rho)) < 2e-3
+    leader = truth.leader.copy()
+    leader[200:, 2] += math.pi
+    assert noise_free_orbit(scenario, replace(truth, leader=leader), span) is None
