@@ -77,11 +77,9 @@ def test_a_leader_that_backs_up_has_the_shape_of_one_that_faces_the_other_way(
     exact_run_data: RunData,
 ) -> None:
     forwards = TrueStates.of(exact_run_data.truth)
-    backwards = TrueStates.of(
-        [
-            replace(each, leader_theta=each.leader_theta + math.pi, v1=-each.v1)
-            for each in exact_run_data.truth
-        ]
-    )
+    turned = [
+        replace(each, leader_theta=each.leader_theta + math.pi, v1=-each.v1) for each in exact_run_data.truth
+    ]
+    backwards = TrueStates.of(turned)
     for name in TrueStates.__slots__:
         np.testing.assert_allclose(getattr(backwards, name), getattr(forwards, name), atol=1e-12)
