@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from controllers.guard import CLOCK_TOLERANCE_NS
+from estimation.bounds.window_velocity import window_velocity
 from estimation.models.measurement import PairSeen, from_sensor, measure_body
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE
@@ -76,11 +77,13 @@ def _read_frame(desk: Desk, payload: bytes, names: bytes, again: bool) -> Frame:
 def _estimated(desk: Desk, reasons: bytes, now_ns: int) -> int:
     """Put the newest estimate of a track that has one down, and its message into the buffer; its length."""
     rules, notes = load(NodeRules, desk.rules, 0), load(Notes, desk.notes, 0)
-    newest = step.estimate(load(Known, desk.known, 0), desk.points, rules.step, now_ns)
+    known = load(Known, desk.known, 0)
+    newest = step.estimate(known, desk.points, rules.step, now_ns)
     estimate = newest.estimate
+    window = window_velocity(desk.points, known.track, rules.assumed.positions.longest)
     store(desk.newest, 0, estimate)
     reason = reason_number(estimate.status, newest.cause)
-    numbers = estimate_numbers(estimate, rules.assumed, reason, notes.receipts, now_ns)
+    numbers = estimate_numbers(estimate, window, rules.assumed, reason, notes.receipts, now_ns)
     store(desk.notes, 0, notes._replace(receipts=0, estimated_ns=now_ns))
     return write_estimate_message(
         desk.buffer, rules.times_at, reasons, numbers, estimate.joint, desk.receipts
