@@ -129,8 +129,9 @@ def frame_seen(desk: Desk, payload: bytes, names: bytes, again: bool, digest: in
     if math.sqrt(dx * dx + dy * dy) < _SAME_PLACE:
         count(desk.counts, SAME_PLACE)
         return came
-    follower = Pose(frame.follower_x, frame.follower_y, frame.follower_theta)
-    store(desk.frame, 0, TimedFrame(timed.capture_ns, PairSeen(frame.leader_x, frame.leader_y, follower)))
+    body = Pose(frame.follower_x, frame.follower_y, frame.follower_theta)
+    seen = step.with_robot(PairSeen(frame.leader_x, frame.leader_y, body), rules.step.mount)
+    store(desk.frame, 0, TimedFrame(timed.capture_ns, seen))
     return came + SEEN
 
 

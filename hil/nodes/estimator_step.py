@@ -55,6 +55,7 @@ from estimation.tracking.tracker import (
     with_motion,
 )
 from formation.kernel import kernel
+from formation.mount import NO_MOUNT, Mount, robot_pose
 from formation.records import Rows, store
 from formation.ring import Ring, place
 
@@ -66,7 +67,8 @@ class Rules(NamedTuple):
     """All that is fixed about an estimator.
 
     source: where the follower's motion is from. reprocesses: whether odometry that comes late is folded in
-    again. span: seconds of odometry kept. noise: of a mocap pose.
+    again. span: seconds of odometry kept. noise: of a mocap pose. mount: of the follower's
+    body.
     """
 
     settings: TrackSettings
@@ -77,6 +79,7 @@ class Rules(NamedTuple):
     noise: PoseNoise
     trust: InputTrust
     own_noise: OwnNoise
+    mount: Mount = NO_MOUNT
 
 
 class Memory(NamedTuple):
@@ -110,6 +113,15 @@ class Told(NamedTuple):
 
     estimate: Estimate
     cause: int
+
+
+@kernel
+def with_robot(seen: PairSeen, mount: Mount) -> PairSeen:
+    """What a frame shows, with the follower's own pose in the place of its body's.
+
+    The leader's stays its body's, which only the filter knows how to tell from the leader.
+    """
+    return seen._replace(follower=robot_pose(seen.follower, mount))
 
 
 @kernel
