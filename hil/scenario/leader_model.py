@@ -34,7 +34,7 @@ def process_noise(scenario: Scenario) -> ProcessNoise:
 def leader_model(scenario: Scenario) -> Model:
     """How the leader's state moves, in the frame of the scenario's front end."""
     given = scenario.estimator
-    correlation = ODOMETRY_CORRELATION if given.own_motion == "odometry" else TRACK_CORRELATION
+    correlation = ODOMETRY_CORRELATION if given.own_motion in ("odometry", "auto") else TRACK_CORRELATION
     front_end = FrontEnd(given.front_end)
     return Model(
         front_end, leader_limits(scenario), process_noise(scenario), correlation, leader_lever(scenario)

@@ -29,7 +29,7 @@ OFFLINE_ESTIMATORS: tuple[OfflineName, ...] = get_args(OfflineName)
 LAW_NAMES: tuple[LawName, ...] = get_args(LawName)
 ESTIMATOR_NAMES: tuple[EstimatorName | OfflineName, ...] = (*get_args(EstimatorName), *OFFLINE_ESTIMATORS)
 FrontEnd = Literal["world", "body"]
-OwnMotion = Literal["odometry", "mocap", "fused"]
+OwnMotion = Literal["odometry", "mocap", "fused", "auto"]
 ClockName = Literal["trusted", "estimated"]
 
 
@@ -155,11 +155,27 @@ class FollowerSection(_Section, frozen=True, kw_only=True):
     mount: MountTriple = (0.0, 0.0, 0.0)
 
 
+class OdometryFaultSection(_Section, frozen=True, kw_only=True):
+    """A fault of the emulated odometry of all followers, ``at_s`` after the leader set off.
+
+    ``silent``: no samples; ``nan``: a twist of NaN; ``zero``: a twist of 0 with a right pose; ``reversed``:
+    both with the opposite sign; ``scale``: both times ``factor``; ``delay``: samples come, and are stamped,
+    ``delay_s`` later; ``slip``: the share ``factor`` |u2| (u2 in rad/s, at most 0.9) of what the wheels turn
+    is lost; ``reset``: the pose begins anew at its origin, once. ``duration_s`` 0 stands for good.
+    """
+
+    kind: Literal["silent", "nan", "zero", "reversed", "scale", "delay", "slip", "reset"]
+    at_s: NonNegative
+    duration_s: NonNegative = 0.0
+    factor: float = 0.5
+    delay_s: Span = 0.2
+
+
 class RobotSection(_Section, frozen=True, kw_only=True):
     """The emulated robots: first-order actuator lag, limits, command resolution, wheel odometry.
 
     Odometry is noisy, stamped ``odometry_delay_s`` later than the motion that it tells of, and tells the
-    motion times ``odometry_scale_v`` and ``odometry_scale_u``.
+    motion times ``odometry_scale_v`` and ``odometry_scale_u``; its pose adds that up, without noise.
     """
 
     lag_s: NonNegative = 0.1
@@ -173,6 +189,7 @@ class RobotSection(_Section, frozen=True, kw_only=True):
     odometry_delay_s: Span = 0.0
     odometry_scale_v: Positive = 1.0
     odometry_scale_u: Positive = 1.0
+    odometry_faults: tuple[OdometryFaultSection, ...] = ()
 
 
 class FaultSection(_Section, frozen=True, kw_only=True):
