@@ -3,8 +3,8 @@
     python benchmarks/odometry_faults.py [--seeds 20] [--own-motion auto] [--set KEY=VALUE ...] [FAULT ...]
 
 The scenario ``turtlebot3``, 30 s; each fault begins 10 s after the leader set off and lasts. Printed:
-deviation of rho [mm] and alpha1 [deg] from the noise-free run, root of the mean square over 15 to 30 s, of the
-median run and of the worst; and what the estimator says of odometry in the end, in how many runs.
+deviation of rho [mm] and alpha1 [deg] from the noise-free run, root of the mean square over 15 to 30 s, of
+the median run and of the worst; and what the estimator says of odometry in the end, in how many runs.
 """
 
 from __future__ import annotations
