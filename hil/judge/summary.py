@@ -21,6 +21,7 @@ from hil.judge.estimation import judge_estimation
 from hil.judge.findings import findings_list
 from hil.judge.formation import judge_formation
 from hil.judge.made_by import law_json
+from hil.judge.published_bounds import judge_published
 from hil.judge.run_data import RunData
 from hil.log.report_json import known
 from hil.scenario.certificate import certificate_json, certificate_of
@@ -56,7 +57,9 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "duration_s": columns.run.seconds,
         "frames": _frames(run_data),
         "estimation": estimation,
-        "bounds": judge_bounds(given, columns) | judge_assumptions(given, columns),
+        "bounds": judge_bounds(given, columns)
+        | judge_assumptions(given, columns)
+        | judge_published(given, columns),
         "certified": judge_certified(run_data.certified, columns.truth, columns.span),
         "certificate": run_data.certificate or certificate_json(certificate_of(given, driven=driven)),
         "formation": judge_formation(run_data, columns),

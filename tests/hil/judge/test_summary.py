@@ -58,7 +58,7 @@ def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
         },
         "bounds": {
             *("M_rho", "M_alpha2", "v_eps", "checked", "violations", "tightness"),
-            *("input_errors_hold", "assumed"),
+            *("input_errors_hold", "assumed", "published", "largest_errors_seen"),
         },
         "certificate": parts["certificate"],
         "formation": {
@@ -189,7 +189,8 @@ def test_what_nobody_knows_is_absent(exact_run_data: RunData) -> None:
     assert set(summary["estimation"]) == {
         *("evaluated_from_s", "samples", "untracked", "settle_s", "nis_mean")
     }
-    assert set(summary["bounds"]) == {"M_rho", "M_alpha2", "v_eps", "checked"}
+    assert set(summary["bounds"]) == {"M_rho", "M_alpha2", "v_eps", "checked", "published"}
+    assert set(summary["bounds"]["published"]) == {"median", "says_something"}
     assert summary["bounds"]["checked"] == 0
     assert set(summary["frames"]) == {"received", "used", "late", "rejected"}
 
