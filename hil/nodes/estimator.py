@@ -23,6 +23,7 @@ from hil.nodes.estimator_memory import EstimatorMemory, node_rules
 from hil.nodes.estimator_step import AUTO, MOCAP, Known, is_under_way
 from hil.nodes.findings import Findings, named_findings
 from hil.nodes.frame_time import clock_report
+from hil.nodes.leader_findings import leader_findings
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
 from hil.nodes.odometry_findings import odometry_findings
 from hil.nodes.sensor_offsets import offsets_report
@@ -233,7 +234,8 @@ class EstimatorNode:
 
         A replay in one pass asks too, and has loaded none of the node's own steps.
         """
-        return odometry_findings(state.memory.known, self.rules.step, now_ns)
+        known = state.memory.known
+        return {**odometry_findings(known, self.rules.step, now_ns), **leader_findings(known.travel, now_ns)}
 
     def _missing(self, known: Known) -> str:
         """What the estimator waits for to begin."""

@@ -51,11 +51,11 @@ from estimation.own_motion.own_track import (
     own_predicted,
     own_reprocessed,
 )
-from estimation.tracking.estimate import Estimate, estimate_at
+from estimation.tracking.estimate import Estimate, estimate_at, guessed_when_slow
 from estimation.tracking.follower_check import BELIEVED
 from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
 from estimation.tracking.follower_check import GATED as LEADER_OFF
-from estimation.tracking.track_point import DUPLICATE, GATED, LATE, TrackPoint
+from estimation.tracking.track_point import DUPLICATE, GATED, LATE, RESTARTED, TrackPoint
 from estimation.tracking.tracker import (
     TrackSettings,
     add,
@@ -67,6 +67,7 @@ from estimation.tracking.tracker import (
     status_of,
     with_motion,
 )
+from estimation.tracking.travel_watch import TravelWatch, travelled
 from formation.kernel import kernel
 from formation.mount import NO_MOUNT, Mount, robot_pose
 from formation.records import Rows, store
@@ -112,7 +113,8 @@ class Memory(NamedTuple):
 class Known(NamedTuple):
     """Where the rows are filled, by what odometry is corrected, and how far it is believed.
 
-    ``watched_ns``: capture of the first frame since when odometry is missed, 0 before.
+    ``watched_ns``: capture of the first frame since when odometry is missed, 0 before. ``travel``: which way
+    the leader went, where it is seen in the world.
     """
 
     track: Ring
@@ -121,6 +123,7 @@ class Known(NamedTuple):
     correction: Correction
     odometry_check: OdometryCheck
     watched_ns: int
+    travel: TravelWatch
 
 
 class Taken(NamedTuple):
@@ -278,7 +281,22 @@ def take(known: Known, memory: Memory, rules: Rules, measurement: Measurement) -
     late = ring.length > 0 and measurement.capture_ns < capture_at(points, ring, ring.length - 1)
     added = add(points, ring, measurement, rules.settings, rules.filter)
     cause = added.cause if added.verdict == GATED else BELIEVED
-    return Taken(known._replace(track=added.ring), added.verdict, cause, late)
+    known = known._replace(track=added.ring)
+    if rules.filter.in_world and not late:
+        known = known._replace(travel=_travel(known.travel, newest(points, added.ring), rules))
+    return Taken(known, added.verdict, cause, late)
+
+
+@kernel
+def _travel(watch: TravelWatch, point: TrackPoint, rules: Rules) -> TravelWatch:
+    """Which way the leader went, with the newest point of its track."""
+    if point.verdict == GATED:
+        return watch
+    capture_ns, unsure = point.measurement.capture_ns, point.verdict == RESTARTED and not point.settled
+    if unsure and (capture_ns - watch.at_ns) * _NS > rules.settings.lost_after:
+        # Begun anew: what it did meanwhile nobody saw.
+        return TravelWatch(False, 0.0, 0.0, 0, False, watch.turned_ns)
+    return travelled(watch, point.belief, capture_ns, point.settled, rules.filter.limits)
 
 
 @kernel
@@ -388,4 +406,5 @@ def is_under_way(known: Known, rules: Rules) -> bool:
 def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) -> Told:
     """Newest estimate of a track that has one, its status as seen at ``now_ns``."""
     point = newest(points, known.track)
-    return Told(estimate_at(point, status_of(point, now_ns, rules.settings)), point.cause)
+    told = estimate_at(point, status_of(point, now_ns, rules.settings))
+    return Told(guessed_when_slow(told, rules.filter.limits.v_eps), point.cause)
