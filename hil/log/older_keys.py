@@ -16,6 +16,8 @@ BEFORE: dict[str, Any] = {
     "follower.mount": [0.0, 0.0, 0.0],
     "mocap.leader_mount": [0.0, 0.0, 0.0],
     "mocap.follower_mount": [0.0, 0.0, 0.0],
+    "robot.odometry_faults": [],
+    "estimator.own_motion": "odometry",
 }
 """Value of ``section.key`` for logs without it; a test asks for every key that a reference log lacks."""
 

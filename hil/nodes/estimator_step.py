@@ -17,7 +17,7 @@ from estimation.models.measurement import (
     measure_body_from_mocap,
     measure_world,
 )
-from estimation.own_motion.judged_odometry import FRESH, age_of, aged, is_better, with_own_track
+from estimation.own_motion.judged_odometry import age_of, aged, fresh_for, is_better, with_own_track
 from estimation.own_motion.odometry_check import (
     POSE,
     TRACK,
@@ -175,20 +175,26 @@ def by_pose(before: OdometrySample, after: OdometrySample) -> MotionSample:
 
 
 @kernel
+def _trust(known: Known, rules: Rules) -> InputTrust:
+    """What is known of odometry, its delay as it is corrected."""
+    return rules.trust._replace(delay=rules.trust.delay + known.correction.delay)
+
+
+@kernel
 def _fresh_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
     """Motion by odometry that is believed, as old as it is; by nothing at all if there is none to believe."""
     motion, check = by_odometry(known, memory, rules, capture_ns), known.odometry_check
     if source_of(check) == TRACK or not check.heard:
         return motion._replace(sd_v2=rules.own_noise.v_max, sd_u2=rules.own_noise.u_max)
-    return aged(motion, check, age_of(check, capture_ns, rules.trust), rules.own_noise)
+    return aged(motion, check, age_of(check, capture_ns, _trust(known, rules)), rules.own_noise)
 
 
 @kernel
 def _is_fresh(known: Known, rules: Rules, capture_ns: int) -> bool:
     """Whether odometry is believed and covers a capture."""
     check = known.odometry_check
-    age = age_of(check, capture_ns, rules.trust)
-    return check.heard and source_of(check) != TRACK and age <= FRESH * check.period
+    age = age_of(check, capture_ns, _trust(known, rules))
+    return check.heard and source_of(check) != TRACK and age <= fresh_for(check)
 
 
 @kernel
@@ -221,7 +227,7 @@ def _judged(known: Known, memory: Memory, rules: Rules) -> OdometryCheck:
     check = known.odometry_check
     if not awaits_track(check):
         return check
-    return with_own_track(check, memory.ways, memory.own, known.own, rules.own_noise, rules.trust)
+    return with_own_track(check, memory.ways, memory.own, known.own, rules.own_noise, _trust(known, rules))
 
 
 @kernel
@@ -289,6 +295,8 @@ def take_odometry(known: Known, memory: Memory, rules: Rules, told: OdometrySamp
         check = known.odometry_check
         if source_of(check) == POSE and told.has_pose and check.last.has_pose:
             sample = by_pose(check.last, told)
+        by = known.correction
+        told = told._replace(v2=by.scale_v * told.v2, u2=by.scale_u * told.u2)
         check = with_sample(check, memory.ways, told, rules.own_noise)
         known = known._replace(odometry_check=check)
         if known.own.length > 0:

@@ -239,7 +239,8 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``front_end`` world: leader position and follower pose from mocap; body: range and bearing of the leader
     and the follower's own motion, taken as noisy. Where commands stand in for odometry the motion comes
     ``input_delay_s`` after its signal, and up to ``input_lag_s`` later still.
-    ``own_motion``: where v2 and u2 come from: odometry, the follower's own mocap track, or both fused.
+    ``own_motion``: where v2 and u2 come from: odometry, the follower's own mocap track, both fused, or auto:
+    odometry while the track bears it out, else the track.
     ``sigma_range``, ``sigma_bearing``: of a body-frame sensor; for mocap they follow from the geometry.
     ``sensor_x``, ``sensor_y``: how far [m] such a sensor sits ahead of the middle of the follower's wheel
     axis and to its left. ``range_bias`` [m], ``bearing_bias`` [rad]: by how much its values are above the
@@ -260,7 +261,7 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
 
     kind: str = "ekf"
     front_end: FrontEnd = "world"
-    own_motion: OwnMotion = "odometry"
+    own_motion: OwnMotion = "auto"
     clock: ClockName = "trusted"
     transport_latency_s: Span = 0.0
     stamp_offset_s: Annotated[float, Meta(ge=-1e5, le=1e5)] = 0.0
