@@ -90,6 +90,7 @@ def _run_data(log: Log, played: Played) -> RunData:
         certified=played.certified,
         taken=played.estimator.taken,
         refused=played.estimator.refused,
+        noise_scale=played.estimator.noise_scale,
     )
 
 

@@ -19,6 +19,7 @@ from hil.judge.columns import Columns, columns_of
 from hil.judge.estimation import judge_estimation
 from hil.judge.formation import judge_formation
 from hil.judge.made_by import law_json
+from hil.judge.noise import certain, judge_noise, supported
 from hil.judge.run_data import RunData
 from hil.log.report_json import known
 from hil.scenario.certificate import certificate_json, certificate_of
@@ -38,11 +39,13 @@ def summarise(run_data: RunData) -> dict[str, Any]:
     are absent for recordings that were not driven by them. ``certified``: only where estimates are certified.
     ``law``: a name, of one's own more (:func:`hil.judge.made_by.law_json`).
     ``orders_refused``: why the scenario's own orders to change sides were, if they were.
-    ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it.
+    ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it, and ``certified`` hold
+    no figures where ``noise`` says that the noise exceeds what they rest on.
     """
     columns = columns_of(run_data)
     given = run_data.scenario
     driven = run_data.motion_since_ns is not None
+    scale = run_data.noise_scale
     summary = {
         "scenario": given.name,
         "seed": given.run.seed if driven else None,
@@ -53,8 +56,11 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "frames": _frames(run_data),
         "estimation": judge_estimation(run_data, columns),
         "bounds": judge_bounds(given, columns) | judge_assumptions(given, columns),
-        "certified": judge_certified(run_data.certified, columns.truth, columns.span),
-        "certificate": run_data.certificate or certificate_json(certificate_of(given, driven=driven)),
+        "noise": judge_noise(scale),
+        "certified": certain(judge_certified(run_data.certified, columns.truth, columns.span), scale),
+        "certificate": supported(
+            run_data.certificate or certificate_json(certificate_of(given, driven=driven)), scale
+        ),
         "formation": judge_formation(run_data, columns),
         "latency_ms": _latency(columns),
         "clock": judge_clock(arrival_rows(run_data)),

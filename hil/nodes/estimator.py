@@ -21,6 +21,7 @@ from hil.nodes.estimator_inputs import RESTARTED, SEEN, SET_BACK, TICK_NS
 from hil.nodes.estimator_memory import EstimatorMemory, node_rules
 from hil.nodes.frame_time import clock_report
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
+from hil.nodes.noise_report import noise_report, scale_of
 from hil.nodes.sensor_offsets import offsets_report
 from hil.scenario.files import refuse_unrunnable
 from hil.scenario.schema import Scenario
@@ -78,6 +79,11 @@ class EstimatorState:
     def refused(self) -> Counts:
         """Inputs that were not used, by cause."""
         return self.memory.refused
+
+    @property
+    def noise_scale(self) -> float | None:
+        """Noise of positions as it is found over what is told, None where it is given."""
+        return scale_of(self.memory.known.noise, self.memory.rules.step.noise_learning)
 
 
 class EstimatorNode:
@@ -216,6 +222,7 @@ class EstimatorNode:
             if self.scenario.estimator.bias_states and known.track.length
             else {}
         )
+        values |= noise_report(known.noise, self.rules.step.noise_learning)
         if self.aligns:
             applied = state.comparison.applied._asdict()
             values |= {f"odometry.{name}": value for name, value in applied.items()}

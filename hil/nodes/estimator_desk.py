@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controllers.guard import CLOCK_TOLERANCE_NS
+from estimation.consistency.noise_estimate import NOISE_AS_TOLD, kept_noise
 from estimation.models.measurement import PairSeen
 from estimation.own_motion.odometry_history import IDEAL, MotionSample
 from estimation.own_motion.own_track import OwnPoint
@@ -115,7 +116,7 @@ def noted(desk: Desk, digest: int, now_ns: int) -> bool:
     return now_ns >= notes.heard_ns - CLOCK_TOLERANCE_NS
 
 
-NOTHING_KNOWN = Known(EMPTY, EMPTY, EMPTY, IDEAL)
+NOTHING_KNOWN = Known(EMPTY, EMPTY, EMPTY, IDEAL, NOISE_AS_TOLD)
 
 
 @kernel
@@ -127,4 +128,5 @@ def forget(desk: Desk) -> None:
 @kernel
 def forget_tracks(desk: Desk) -> None:
     """Know nothing of where leader and follower are."""
-    store(desk.known, 0, load(Known, desk.known, 0)._replace(track=EMPTY, own=EMPTY))
+    known = load(Known, desk.known, 0)
+    store(desk.known, 0, known._replace(track=EMPTY, own=EMPTY, noise=kept_noise(known.noise)))

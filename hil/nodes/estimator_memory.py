@@ -40,7 +40,14 @@ from hil.nodes.frame_time import time_rules
 from hil.nodes.node import Counts
 from hil.nodes.refusals import COUNTED, REFUSALS, TAKEN, TAKEN_FRAME
 from hil.nodes.status_reasons import ALL_REASONS
-from hil.scenario.leader_model import input_trust, leader_filter, own_noise, pose_noise, track_settings
+from hil.scenario.leader_model import (
+    input_trust,
+    leader_filter,
+    noise_learning,
+    own_noise,
+    pose_noise,
+    track_settings,
+)
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire.assumed_errors import AssumedErrors
@@ -79,6 +86,7 @@ def rules_of(scenario: Scenario) -> Rules:
         noise=pose_noise(scenario),
         trust=input_trust(scenario),
         own_noise=own_noise(scenario),
+        noise_learning=noise_learning(scenario),
     )
 
 

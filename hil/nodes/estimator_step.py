@@ -8,6 +8,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from estimation.consistency.noise_estimate import (
+    Moment,
+    NoiseEstimate,
+    NoiseLearning,
+    noise_with_frame,
+    scaled_noise,
+)
 from estimation.filters.filter import Filter
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import (
@@ -66,7 +73,7 @@ class Rules(NamedTuple):
     """All that is fixed about an estimator.
 
     source: where the follower's motion is from. reprocesses: whether odometry that comes late is folded in
-    again. span: seconds of odometry kept. noise: of a mocap pose.
+    again. span: seconds of odometry kept. noise: of a mocap pose. noise_learning: by what this is put right.
     """
 
     settings: TrackSettings
@@ -77,6 +84,7 @@ class Rules(NamedTuple):
     noise: PoseNoise
     trust: InputTrust
     own_noise: OwnNoise
+    noise_learning: NoiseLearning
 
 
 class Memory(NamedTuple):
@@ -88,12 +96,13 @@ class Memory(NamedTuple):
 
 
 class Known(NamedTuple):
-    """Where the rows are filled, and by what odometry is corrected."""
+    """Where the rows are filled, by what odometry is corrected, and what is known of the noise."""
 
     track: Ring
     odometry: Ring
     own: Ring
     correction: Correction
+    noise: NoiseEstimate
 
 
 class Taken(NamedTuple):
@@ -130,7 +139,29 @@ def due_pose(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: 
 
 @kernel
 def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
-    """Take in a mocap frame that was captured at a time by the host's clock."""
+    """Take in a mocap frame that was captured at a time by the host's clock.
+
+    It is taken with the noise as known from the frames before, and keeps that if it is folded again.
+    """
+    if not rules.noise_learning.learns:
+        return _take_frame(known, memory, rules, capture_ns, seen)
+    noise = scaled_noise(rules.noise, known.noise)
+    taken = _take_frame(known, memory, with_noise(rules, noise), capture_ns, seen)
+    if taken.late or taken.verdict == DUPLICATE or taken.verdict == LATE:
+        return taken
+    gated = taken.cause != BELIEVED
+    learned = noise_with_frame(known.noise, Moment(capture_ns, seen), gated, rules.noise_learning)
+    return taken._replace(known=taken.known._replace(noise=learned))
+
+
+@kernel
+def with_noise(rules: Rules, noise: PoseNoise) -> Rules:
+    """Rules by which poses have this noise."""
+    return rules._replace(noise=noise, own_noise=rules.own_noise._replace(pose=noise))
+
+
+@kernel
+def _take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
     if rules.source == ODOMETRY:
         motion = by_odometry(known, memory, rules, capture_ns)
         return take(known, memory, rules, measured(rules, capture_ns, seen, motion))

@@ -213,7 +213,8 @@ class FollowerReplay:
         )
         state = self.nodes.estimating
         if not self.same:
-            return KeptReplay(self.link, kept, state.taken, state.refused, {}, estimating.missing)
+            missing, noise = estimating.missing, state.noise_scale
+            return KeptReplay(self.link, kept, state.taken, state.refused, {}, missing, noise_scale=noise)
         return KeptReplay(
             self.link,
             kept,
@@ -225,6 +226,7 @@ class FollowerReplay:
             },
             missing_inputs=estimating.missing + deciding.missing,
             restarts=self.restarts,
+            noise_scale=state.noise_scale,
         )
 
     def _parity(self, part: Part, compared: int, also: set[int], unrecorded: int) -> Parity:

@@ -41,7 +41,8 @@ class Kept:
 class KeptReplay:
     """A replay of one follower, as :class:`hil.replay.rerun.Replay` is, with rows in the place of messages.
 
-    ``taken``, ``refused``: the estimator's counts. ``fed`` is empty, since who is fed is replayed otherwise.
+    ``taken``, ``refused``, ``noise_scale``: the estimator's counts, and the noise that it found. ``fed`` is
+    empty, since who is fed is replayed otherwise.
     """
 
     link: Link
@@ -52,6 +53,7 @@ class KeptReplay:
     missing_inputs: int = 0
     restarts: Mapping[str, int] = field(default_factory=dict)
     fed: str = ""
+    noise_scale: float | None = None
 
     @property
     def scenario(self) -> Scenario:
