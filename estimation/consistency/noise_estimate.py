@@ -10,6 +10,9 @@ Therefore the same differences are taken over strides of 50 ms as well. Over the
 noise is, so that they can keep the scale from falling below one, and no more.
 
 Noise is that of bodies that move; who stands is quieter, and isn't asked.
+
+A sensor on board sees the leader too seldom for that, and from a robot that turns. Its noise is told by the
+innovations of the track instead, less what of them the prediction accounts for.
 """
 
 from __future__ import annotations
@@ -17,13 +20,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from estimation.consistency.noise_level import AS_TOLD, Innovation, Level, certain_scale, learned
 from estimation.models.measurement import PairSeen, PoseNoise
+from estimation.tracking.track_point import GATED, RESTARTED, TrackPoint
 from formation.angles import wrapped
 from formation.kernel import kernel
 from formation.pose import Pose
-
-LEAST_SCALE, MOST_SCALE = 0.1, 30.0
-"""Within which the noise is looked for, in multiples of what is told."""
 
 REFUTED = 1.3
 """Scale above which what was told is refuted."""
@@ -31,15 +33,7 @@ REFUTED = 1.3
 _NS = 1e-9
 _STRIDE_NS = 50_000_000  # longer than marker filters and the shaking of a wheel remember
 _LONGEST_NS = 500_000_000  # four positions further apart tell more of the motion than of the noise
-_CLIP = 2.25  # variances that a square counts for at the most: outliers and speed steps are few
-_CLIPPED_MEAN = 0.7785  # of the square of a standard normal that is cut off there
-_BEGIN = 4.0  # differences that what is told counts as
-_QUICK, _SLOW = 128.0, 1000.0  # differences that the two means reach back
-_CHANGED = 2.0  # factor between the two variances by which the noise has become another
-_VARIANCE = (
-    6.0  # of a mean over n differences, times n: 2 as squares, 2.3 as they overlap, 1.3 as they are cut
-)
-_SURE = 1.5  # standard deviations by which the noise must differ from what is told
+_LEAST_LEFT = 0.05  # of an innovation after the update; what leaves less tells nothing of the noise
 _HALF_TRACK = 0.1  # by which a turn rate is the speed of a wheel [m]
 
 
@@ -49,14 +43,6 @@ class NoiseLearning(NamedTuple):
     learns: bool
     told: PoseNoise
     moving: float
-
-
-class Level(NamedTuple):
-    """A variance over the one that is told: by many differences, by the last few, and how many they are."""
-
-    ratio: float
-    quick: float
-    weight: float
 
 
 class Moment(NamedTuple):
@@ -82,23 +68,33 @@ class Levels(NamedTuple):
     heading: Level
 
 
+class SightLevels(NamedTuple):
+    """Of ranges and of bearings."""
+
+    range: Level
+    bearing: Level
+
+
 class NoiseScale(NamedTuple):
-    """Standard deviations over those that are told: of a position, and of the follower's heading."""
+    """Standard deviations over those told: of positions, the follower's heading, ranges and bearings."""
 
     position: float
     heading: float
+    range: float
+    bearing: float
 
 
 class NoiseEstimate(NamedTuple):
     """All that is known of the noise.
 
     scale: what measurements are taken with now. frames, strides: neighbouring frames, and frames at least
-    50 ms apart. gated: whether the newest frame wasn't believed.
+    50 ms apart. gated: whether the newest frame or sighting wasn't believed.
     """
 
     scale: NoiseScale
     by_frame: Levels
     by_stride: Levels
+    sight: SightLevels
     frames: Moments
     strides: Moments
     gated: bool
@@ -113,13 +109,13 @@ class Weights(NamedTuple):
     c: float
 
 
-_AS_TOLD = Level(1.0, 1.0, _BEGIN)
 _NO_MOMENT = Moment(0, PairSeen(0.0, 0.0, Pose(0.0, 0.0, 0.0)))
 _NO_MOMENTS = Moments(0, _NO_MOMENT, _NO_MOMENT, _NO_MOMENT)
 NOISE_AS_TOLD = NoiseEstimate(
-    NoiseScale(1.0, 1.0),
-    Levels(_AS_TOLD, _AS_TOLD),
-    Levels(_AS_TOLD, _AS_TOLD),
+    NoiseScale(1.0, 1.0, 1.0, 1.0),
+    Levels(AS_TOLD, AS_TOLD),
+    Levels(AS_TOLD, AS_TOLD),
+    SightLevels(AS_TOLD, AS_TOLD),
     _NO_MOMENTS,
     _NO_MOMENTS,
     gated=False,
@@ -152,17 +148,74 @@ def noise_with_frame(
     if gated and not estimate.gated:
         return estimate._replace(gated=True)
     estimate = estimate._replace(gated=gated)
-    if estimate.frames.held > 0 and moment.capture_ns <= estimate.frames.a.capture_ns:
-        return estimate
+    if estimate.frames.held > 0:
+        since_ns = moment.capture_ns - estimate.frames.a.capture_ns
+        if since_ns <= 0:
+            return estimate
+        if since_ns > _LONGEST_NS:
+            estimate = kept_noise(estimate)._replace(gated=gated)
     by_frame = _differenced(estimate.by_frame, estimate.frames, estimate.strides, moment, learning)
     by_stride, strides = estimate.by_stride, estimate.strides
     if strides.held == 0 or moment.capture_ns - strides.a.capture_ns >= _STRIDE_NS:
         by_stride = _differenced(by_stride, strides, strides, moment, learning)
         strides = _pushed(strides, moment)
-    scale = NoiseScale(
-        _scale(by_frame.position, by_stride.position), _scale(by_frame.heading, by_stride.heading)
+    scale = estimate.scale._replace(
+        position=certain_scale(by_frame.position, by_stride.position),
+        heading=certain_scale(by_frame.heading, by_stride.heading),
     )
-    return NoiseEstimate(scale, by_frame, by_stride, _pushed(estimate.frames, moment), strides, gated)
+    frames = _pushed(estimate.frames, moment)
+    return NoiseEstimate(scale, by_frame, by_stride, estimate.sight, frames, strides, gated)
+
+
+@kernel(inline=False)
+def noise_with_sighting(estimate: NoiseEstimate, point: TrackPoint) -> NoiseEstimate:
+    """Estimate after a sighting that has led to the newest point of a track.
+
+    Along the line of sight the innovation is one of range, across it one of bearing.
+    """
+    gated = point.verdict == GATED
+    if (gated and not estimate.gated) or point.verdict == RESTARTED:
+        return estimate._replace(gated=gated)
+    x, y, b = point.measurement.x, point.measurement.y, point.belief
+    rho = math.sqrt(x * x + y * y)
+    if rho <= 0.0:
+        return estimate
+    c, s = x / rho, y / rho
+    r, (dx, dy) = point.measurement.spread, (x - b.x, y - b.y)
+    along = _innovation(
+        c * dx + s * dy,
+        c * c * r.xx + 2.0 * c * s * r.xy + s * s * r.yy,
+        c * c * b.x_x + 2.0 * c * s * b.x_y + s * s * b.y_y,
+        gated,
+    )
+    across = _innovation(
+        c * dy - s * dx,
+        s * s * r.xx - 2.0 * c * s * r.xy + c * c * r.yy,
+        s * s * b.x_x - 2.0 * c * s * b.x_y + c * c * b.y_y,
+        gated,
+    )
+    scale = estimate.scale
+    sight = SightLevels(
+        learned(estimate.sight.range, along, scale.range),
+        learned(estimate.sight.bearing, across, scale.bearing),
+    )
+    scale = scale._replace(
+        range=certain_scale(sight.range, sight.range), bearing=certain_scale(sight.bearing, sight.bearing)
+    )
+    return estimate._replace(scale=scale, sight=sight, gated=gated)
+
+
+@kernel
+def _innovation(residual: float, noise: float, spread: float, gated: bool) -> Innovation:
+    """Innovation of one coordinate, out of what is left of it after the update.
+
+    noise: variance that it was taken with. spread: variance after the update, or before it if there was none.
+    With the gain K what is left is 1 - K of the innovation, and the variance K of the noise.
+    """
+    if gated:
+        return Innovation(residual * residual / noise, spread / noise)
+    left = max(1.0 - spread / noise, _LEAST_LEFT)
+    return Innovation(residual * residual / (noise * left * left), 1.0 / left - 1.0)
 
 
 @kernel
@@ -191,7 +244,8 @@ def _differenced(
     if way > learning.moving * dt and not repeats:
         x = w.new * new.leader_x + w.a * a.leader_x + w.b * b.leader_x + w.c * c.leader_x
         y = w.new * new.leader_y + w.a * a.leader_y + w.b * b.leader_y + w.c * c.leader_y
-        position = _learned(_learned(position, x * x / variance), y * y / variance)
+        position = learned(position, Innovation(x * x / variance, 0.0), 1.0)
+        position = learned(position, Innovation(y * y / variance, 0.0), 1.0)
     here, was = new.follower, since.seen.follower
     way = _distance(here.x - was.x, here.y - was.y) + _HALF_TRACK * abs(wrapped(here.theta - was.theta))
     repeats = (here.x == a.follower.x and here.y == a.follower.y) or (
@@ -200,9 +254,11 @@ def _differenced(
     if way > learning.moving * dt and not repeats:
         x = w.new * here.x + w.a * a.follower.x + w.b * b.follower.x + w.c * c.follower.x
         y = w.new * here.y + w.a * a.follower.y + w.b * b.follower.y + w.c * c.follower.y
-        position = _learned(_learned(position, x * x / variance), y * y / variance)
+        position = learned(position, Innovation(x * x / variance, 0.0), 1.0)
+        position = learned(position, Innovation(y * y / variance, 0.0), 1.0)
         turn = _heading_difference(w, here.theta, before)
-        heading = _learned(heading, turn * turn / (learning.told.heading * learning.told.heading))
+        square = turn * turn / (learning.told.heading * learning.told.heading)
+        heading = learned(heading, Innovation(square, 0.0), 1.0)
     return Levels(position, heading)
 
 
@@ -232,35 +288,3 @@ def _weights(new_ns: int, before: Moments) -> Weights:
     second, third = a * c * ac, -a * b * ab
     by = 1.0 / math.sqrt(new * new + first * first + second * second + third * third)
     return Weights(new * by, first * by, second * by, third * by)
-
-
-@kernel
-def _learned(level: Level, square: float) -> Level:
-    """Level with one more square, over the variance that is told."""
-    weight = min(level.weight + 1.0, _SLOW)
-    ratio = _mean_with(level.ratio, square, weight)
-    quick = _mean_with(level.quick, square, min(weight, _QUICK))
-    if weight > _QUICK and (quick > _CHANGED * ratio or ratio > _CHANGED * quick):
-        return Level(quick, quick, _QUICK)
-    return Level(ratio, quick, weight)
-
-
-@kernel
-def _mean_with(mean: float, square: float, weight: float) -> float:
-    """Mean of squares, none of which counts for more than the clip, with one more of them."""
-    news = min(square / mean, _CLIP) / _CLIPPED_MEAN - 1.0
-    most, least = MOST_SCALE * MOST_SCALE, LEAST_SCALE * LEAST_SCALE
-    return min(most, max(least, mean * (1.0 + news / weight)))
-
-
-@kernel
-def _scale(by_frame: Level, by_stride: Level) -> float:
-    """Scale of standard deviations that is certain: as told, where the noise doesn't clearly differ."""
-    ratio, unsure = by_frame.ratio, 1.0 + _SURE * math.sqrt(_VARIANCE / (2.0 * by_frame.weight))
-    strided = by_stride.ratio / (1.0 + _SURE * math.sqrt(_VARIANCE / (2.0 * by_stride.weight)))
-    ratio = max(ratio, min(1.0, strided))
-    if ratio > unsure:
-        return math.sqrt(ratio / unsure)
-    if ratio * unsure < 1.0:
-        return math.sqrt(ratio * unsure)
-    return 1.0

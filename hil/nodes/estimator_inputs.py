@@ -182,10 +182,10 @@ def _take_sighting(desk: Desk, known: Known, rules: Rules) -> Taken:
     memory, sensor = desk.memory(), load(NodeRules, desk.rules, 0).sensor
     seen = load(Sighting, desk.sighting, 0)
     motion = step.by_odometry(known, memory, rules, seen.capture_ns)
-    measurement = measure_body(
-        seen.capture_ns, seen.rho, seen.alpha2, sensor.sigma_range, sensor.sigma_bearing, motion
-    )
-    return step.take(known, memory, rules, measurement)
+    scale = known.noise.scale
+    sd_range, sd_bearing = scale.range * sensor.sigma_range, scale.bearing * sensor.sigma_bearing
+    measurement = measure_body(seen.capture_ns, seen.rho, seen.alpha2, sd_range, sd_bearing, motion)
+    return step.with_sight_noise(step.take(known, memory, rules, measurement), memory, rules)
 
 
 @kernel

@@ -13,6 +13,7 @@ from estimation.consistency.noise_estimate import (
     NoiseEstimate,
     NoiseLearning,
     noise_with_frame,
+    noise_with_sighting,
     scaled_noise,
 )
 from estimation.filters.filter import Filter
@@ -151,6 +152,16 @@ def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen
         return taken
     gated = taken.cause != BELIEVED
     learned = noise_with_frame(known.noise, Moment(capture_ns, seen), gated, rules.noise_learning)
+    return taken._replace(known=taken.known._replace(noise=learned))
+
+
+@kernel
+def with_sight_noise(taken: Taken, memory: Memory, rules: Rules) -> Taken:
+    """The same with what a sighting that came in order tells of the sensor's noise."""
+    unused = taken.verdict == DUPLICATE or taken.verdict == LATE
+    if not rules.noise_learning.learns or taken.late or unused:
+        return taken
+    learned = noise_with_sighting(taken.known.noise, newest(memory.points, taken.known.track))
     return taken._replace(known=taken.known._replace(noise=learned))
 
 

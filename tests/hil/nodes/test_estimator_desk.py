@@ -47,7 +47,7 @@ def test_tracks_and_odometry_lie_where_they_are_named() -> None:
     assert Memory._fields == ("points", "history", "own")
 
 
-LEARNED = NOISE_AS_TOLD._replace(scale=NoiseScale(2.0, 3.0), gated=True)
+LEARNED = NOISE_AS_TOLD._replace(scale=NoiseScale(2.0, 3.0, 4.0, 5.0), gated=True)
 
 
 def filled(desk: Desk) -> Known:
