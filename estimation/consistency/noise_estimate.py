@@ -45,6 +45,10 @@ class NoiseLearning(NamedTuple):
     moving: float
 
 
+NOISE_GIVEN = NoiseLearning(False, PoseNoise(1.0, 1.0), 0.0)
+"""Nothing is learned of the noise."""
+
+
 class Moment(NamedTuple):
     """A frame that was looked at."""
 

@@ -124,6 +124,10 @@ class Interpreted:
         """See :meth:`Estimator.update`."""
         return _remembering(self.estimator.update(whole_of(belief), measurement))
 
+    def shown(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
+        """See :meth:`~estimation.filters.filter.Filter.shown`; no lever arm is known of here."""
+        return belief
+
     def step(
         self, belief: Gaussian, dt: float, follower: FollowerMotion, measurement: Measurement, gate: float
     ) -> Stepped:

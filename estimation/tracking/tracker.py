@@ -230,7 +230,8 @@ def _taken_over(rejected: TrackPoint, settings: TrackSettings, estimator: Filter
     if tentative.frames < settings.reacquire_frames:
         return rejected
     prior, leader_fits = rejected.belief, rejected.nis <= gate_of(settings)
-    jump = jumped(rejected.jump, measurement, prior, rejected.check, leader_fits)
+    shown = estimator.shown(prior, measurement)
+    jump = jumped(rejected.jump, measurement, shown, rejected.check, leader_fits)
     if line_turn(jump, measurement) > settings.followed_turn:
         return rejected
     belief = estimator.update(prior, measurement) if leader_fits else tentative.belief

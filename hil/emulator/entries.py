@@ -8,6 +8,7 @@ from formation.pose import Motion, Pose
 from formation.records import Buffer, Indices, Rows, borrowed, load, store
 from hil.emulator.faults import Fault
 from hil.emulator.mocap import BodyNormals, SeenPose, Shares
+from hil.emulator.odometry_faults import OdometryFault, Reckoning
 from hil.emulator.robot import Robot, pose_of
 from hil.emulator.world import (
     Happened,
@@ -43,6 +44,8 @@ def advance_world(
     shown: Rows[Pose],
     seen: Rows[SeenPose],
     odometry: Rows[Odometry],
+    odometry_faults: Rows[OdometryFault],
+    reckoned: Rows[Reckoning],
     until_ns: int,
 ) -> Happened:
     """Let the next thing happen that is due until a time; the rows are those of :class:`Memory`."""
@@ -57,6 +60,8 @@ def advance_world(
         borrowed(shown),
         borrowed(seen),
         borrowed(odometry),
+        borrowed(odometry_faults),
+        borrowed(reckoned),
     )
     step = advanced(load(World, world, 0), load(Lab, lab, 0), memory, until_ns)
     store(world, 0, step.world)

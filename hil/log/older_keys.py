@@ -10,7 +10,14 @@ from collections.abc import Mapping
 from copy import deepcopy
 from typing import Any
 
-BEFORE: dict[str, Any] = {"estimator.noise": "given"}
+BEFORE: dict[str, Any] = {
+    "estimator.noise": "given",
+    "controller.mount_check": "warn",
+    "leader.mount": [0.0, 0.0, 0.0],
+    "follower.mount": [0.0, 0.0, 0.0],
+    "mocap.leader_mount": [0.0, 0.0, 0.0],
+    "mocap.follower_mount": [0.0, 0.0, 0.0],
+}
 """Value of ``section.key`` for logs without it; a test asks for every key that a reference log lacks."""
 
 

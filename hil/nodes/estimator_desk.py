@@ -7,6 +7,7 @@ from typing import NamedTuple
 from controllers.guard import CLOCK_TOLERANCE_NS
 from estimation.consistency.noise_estimate import NOISE_AS_TOLD, kept_noise
 from estimation.models.measurement import PairSeen
+from estimation.own_motion.odometry_check import UNCHECKED, OdometrySample, WayEntry, without_track
 from estimation.own_motion.odometry_history import IDEAL, MotionSample
 from estimation.own_motion.own_track import OwnPoint
 from estimation.time.host_time import NO_TIME_YET, HostTime, TimeRows
@@ -76,7 +77,7 @@ NOTHING_NOTED = Notes(NO_TIME_YET, 0, 0, 0, 0, 0, False)
 
 
 class Desk(NamedTuple):
-    """Rows of a node: (1,) but for tracks, odometry, clock, receipts, counts and bodies.
+    """Rows of a node: (1,) but for tracks, odometry, ways, clock, receipts, counts and bodies.
 
     ``frame``, ``sample``, ``sighting``: the newest input, read and checked. ``newest``: the last estimate.
     ``buffer``: its message. ``heads``, ``bodies``, ``wanted``: as a frame is read.
@@ -86,13 +87,14 @@ class Desk(NamedTuple):
     points: Rows[TrackPoint]
     history: Rows[MotionSample]
     own: Rows[OwnPoint]
+    ways: Rows[WayEntry]
     known: Rows[Known]
     time: TimeRows
     notes: Rows[Notes]
     receipts: Rows[Receipt]
     counts: Rows[Count]
     frame: Rows[TimedFrame]
-    sample: Rows[MotionSample]
+    sample: Rows[OdometrySample]
     sighting: Rows[Sighting]
     newest: Rows[Estimate]
     buffer: Buffer
@@ -103,7 +105,7 @@ class Desk(NamedTuple):
     @kernel
     def memory(self) -> Memory:
         """Where the tracks lie."""
-        return Memory(self.points, self.history, self.own)
+        return Memory(self.points, self.history, self.own, self.ways)
 
 
 @kernel
@@ -116,7 +118,7 @@ def noted(desk: Desk, digest: int, now_ns: int) -> bool:
     return now_ns >= notes.heard_ns - CLOCK_TOLERANCE_NS
 
 
-NOTHING_KNOWN = Known(EMPTY, EMPTY, EMPTY, IDEAL, NOISE_AS_TOLD)
+NOTHING_KNOWN = Known(EMPTY, EMPTY, EMPTY, IDEAL, UNCHECKED, 0, NOISE_AS_TOLD)
 
 
 @kernel
@@ -129,4 +131,7 @@ def forget(desk: Desk) -> None:
 def forget_tracks(desk: Desk) -> None:
     """Know nothing of where leader and follower are."""
     known = load(Known, desk.known, 0)
-    store(desk.known, 0, known._replace(track=EMPTY, own=EMPTY, noise=kept_noise(known.noise)))
+    # What was added up of the track does not hang together with what comes.
+    check = without_track(known.odometry_check)
+    noise = kept_noise(known.noise)
+    store(desk.known, 0, known._replace(track=EMPTY, own=EMPTY, odometry_check=check, noise=noise))

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from estimation.consistency.noise_estimate import (
+    NOISE_GIVEN,
     Moment,
     NoiseEstimate,
     NoiseLearning,
@@ -24,6 +25,18 @@ from estimation.models.measurement import (
     PoseNoise,
     measure_body_from_mocap,
     measure_world,
+)
+from estimation.own_motion.judged_odometry import FRESH, age_of, aged, is_better, with_own_track
+from estimation.own_motion.odometry_check import (
+    POSE,
+    TRACK,
+    OdometryCheck,
+    OdometrySample,
+    WayEntry,
+    awaits_track,
+    source_of,
+    way_between,
+    with_sample,
 )
 from estimation.own_motion.odometry_history import (
     Correction,
@@ -49,6 +62,7 @@ from estimation.own_motion.own_track import (
 )
 from estimation.tracking.estimate import Estimate, estimate_at
 from estimation.tracking.follower_check import BELIEVED
+from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
 from estimation.tracking.follower_check import GATED as LEADER_OFF
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE, TrackPoint
 from estimation.tracking.tracker import (
@@ -63,18 +77,22 @@ from estimation.tracking.tracker import (
     with_motion,
 )
 from formation.kernel import kernel
+from formation.mount import NO_MOUNT, Mount, robot_pose
 from formation.records import Rows, store
 from formation.ring import Ring, place
 
-ODOMETRY, MOCAP, FUSED = 0, 1, 2
-"""Where the follower's motion is known from."""
+_NS = 1e-9
+
+ODOMETRY, MOCAP, FUSED, AUTO = 0, 1, 2, 3
+"""Where the follower's motion is known from; AUTO: from odometry while nothing speaks against it."""
 
 
 class Rules(NamedTuple):
     """All that is fixed about an estimator.
 
     source: where the follower's motion is from. reprocesses: whether odometry that comes late is folded in
-    again. span: seconds of odometry kept. noise: of a mocap pose. noise_learning: by what this is put right.
+    again. span: seconds of odometry kept. noise: of a mocap pose. mount: of the follower's
+    body. noise_learning: by what the noise is put right.
     """
 
     settings: TrackSettings
@@ -85,24 +103,35 @@ class Rules(NamedTuple):
     noise: PoseNoise
     trust: InputTrust
     own_noise: OwnNoise
-    noise_learning: NoiseLearning
+    mount: Mount = NO_MOUNT
+    noise_learning: NoiseLearning = NOISE_GIVEN
 
 
 class Memory(NamedTuple):
-    """Rows that an estimator works in: the leader's track, odometry, the follower's own track."""
+    """Rows that an estimator works in: the leader's track, odometry, the follower's own track, and the ways.
+
+    By the ``ways`` that both have gone odometry is judged.
+    """
 
     points: Rows[TrackPoint]
     history: Rows[MotionSample]
     own: Rows[OwnPoint]
+    ways: Rows[WayEntry]
 
 
 class Known(NamedTuple):
-    """Where the rows are filled, by what odometry is corrected, and what is known of the noise."""
+    """Where the rows are filled, by what odometry is corrected, and how far it is believed.
+
+    ``watched_ns``: capture of the first frame since when odometry is missed, 0 before. ``noise``: of
+    measurements, as they tell it.
+    """
 
     track: Ring
     odometry: Ring
     own: Ring
     correction: Correction
+    odometry_check: OdometryCheck
+    watched_ns: int
     noise: NoiseEstimate
 
 
@@ -123,6 +152,15 @@ class Told(NamedTuple):
 
 
 @kernel
+def with_robot(seen: PairSeen, mount: Mount) -> PairSeen:
+    """What a frame shows, with the follower's own pose in the place of its body's.
+
+    The leader's stays its body's, which only the filter knows how to tell from the leader.
+    """
+    return seen._replace(follower=robot_pose(seen.follower, mount))
+
+
+@kernel
 def by_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
     """Motion of the follower as odometry tells it, put right where that is known to be wrong."""
     return follower_motion(memory.history, known.odometry, capture_ns, rules.trust, known.correction)
@@ -136,6 +174,72 @@ def due_pose(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: 
     if told:
         odometry = by_odometry(known, memory, rules, capture_ns)
     return own_begun(capture_ns, seen.follower, told, odometry, rules.own_noise)
+
+
+@kernel
+def by_pose(before: OdometrySample, after: OdometrySample) -> MotionSample:
+    """Mean motion from one pose of odometry to the next, in the middle between them."""
+    span_ns = after.stamp_ns - before.stamp_ns
+    if span_ns <= 0:
+        return MotionSample(after.stamp_ns, after.v2, after.u2)
+    way, dt = way_between(before.pose, after.pose), span_ns * _NS
+    return MotionSample(before.stamp_ns + span_ns // 2, way.v / dt, way.u / dt)
+
+
+@kernel
+def _fresh_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
+    """Motion by odometry that is believed, as old as it is; by nothing at all if there is none to believe."""
+    motion, check = by_odometry(known, memory, rules, capture_ns), known.odometry_check
+    if source_of(check) == TRACK or not check.heard:
+        return motion._replace(sd_v2=rules.own_noise.v_max, sd_u2=rules.own_noise.u_max)
+    return aged(motion, check, age_of(check, capture_ns, rules.trust), rules.own_noise)
+
+
+@kernel
+def _is_fresh(known: Known, rules: Rules, capture_ns: int) -> bool:
+    """Whether odometry is believed and covers a capture."""
+    check = known.odometry_check
+    age = age_of(check, capture_ns, rules.trust)
+    return check.heard and source_of(check) != TRACK and age <= FRESH * check.period
+
+
+@kernel
+def by_either(known: Known, memory: Memory, rules: Rules, due: OwnPoint) -> FollowerMotion:
+    """Motion at a pose that is due: by odometry while that is fresh, else by what is known better."""
+    motion = _fresh_odometry(known, memory, rules, due.capture_ns)
+    if _is_fresh(known, rules, due.capture_ns):
+        return motion
+    own = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
+    return own if is_better(own, motion, rules.own_noise) else motion
+
+
+@kernel
+def by_either_at(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
+    """The same at a point of the follower's own track, which may not have it."""
+    motion = _fresh_odometry(known, memory, rules, capture_ns)
+    if _is_fresh(known, rules, capture_ns):
+        return motion
+    at = own_place(memory.own, known.own, capture_ns)
+    if at == known.own.length:
+        return motion
+    point = own_point(memory.own, known.own, at)
+    own = motion_of(point)
+    return own if point.capture_ns == capture_ns and is_better(own, motion, rules.own_noise) else motion
+
+
+@kernel
+def _judged(known: Known, memory: Memory, rules: Rules) -> OdometryCheck:
+    """Odometry's check with what the follower's own track has to say."""
+    check = known.odometry_check
+    if not awaits_track(check):
+        return check
+    return with_own_track(check, memory.ways, memory.own, known.own, rules.own_noise, rules.trust)
+
+
+@kernel
+def take_not_finite(known: Known, now_ns: int) -> Known:
+    """Take note of odometry that came with a number that is none."""
+    return known._replace(odometry_check=known.odometry_check._replace(bad_ns=now_ns))
 
 
 @kernel
@@ -177,12 +281,17 @@ def _take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, see
         motion = by_odometry(known, memory, rules, capture_ns)
         return take(known, memory, rules, measured(rules, capture_ns, seen, motion))
     due = due_pose(known, memory, rules, capture_ns, seen)
-    motion = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
-    if known.own.length > 0 and capture_ns < own_point(memory.own, known.own, 0).capture_ns:
-        motion = by_odometry(known, memory, rules, capture_ns)
+    if rules.source == AUTO:
+        motion = by_either(known, memory, rules, due)
+    else:
+        motion = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
+        if known.own.length > 0 and capture_ns < own_point(memory.own, known.own, 0).capture_ns:
+            motion = by_odometry(known, memory, rules, capture_ns)
     taken = take(known, memory, rules, measured(rules, capture_ns, seen, motion))
     # A follower's pose that is not believed must not move its own track either.
     believed = taken.cause == BELIEVED or taken.cause == LEADER_OFF
+    # Odometry that lies must not keep its judge from the poses that tell so: the track has a gate of its own.
+    believed = believed or (rules.source == AUTO and taken.cause == FOLLOWER_OFF)
     if taken.verdict == DUPLICATE or taken.verdict == LATE or not believed:
         return taken
     own = folded(memory.own, taken.known.own, due, rules.own_noise, rules.settings.window)
@@ -191,6 +300,9 @@ def _take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, see
         first = place_of(memory.points, after.track, capture_ns)
         _with_own_motion(after, memory, rules, first)
         reprocessed(memory.points, after.track, first, rules.settings, rules.filter)
+    if rules.source == AUTO:
+        since_ns = after.watched_ns if after.watched_ns > 0 else capture_ns
+        after = after._replace(odometry_check=_judged(after, memory, rules), watched_ns=since_ns)
     return taken._replace(known=after)
 
 
@@ -214,12 +326,21 @@ def take(known: Known, memory: Memory, rules: Rules, measurement: Measurement) -
 
 
 @kernel
-def take_odometry(known: Known, memory: Memory, rules: Rules, sample: MotionSample) -> Known:
+def take_odometry(known: Known, memory: Memory, rules: Rules, told: OdometrySample) -> Known:
     """Take in a sample of odometry, and fold again what came after the sample before it."""
+    sample = MotionSample(told.stamp_ns, told.v2, told.u2)
+    if rules.source == AUTO:
+        check = known.odometry_check
+        if source_of(check) == POSE and told.has_pose and check.last.has_pose:
+            sample = by_pose(check.last, told)
+        check = with_sample(check, memory.ways, told, rules.own_noise)
+        known = known._replace(odometry_check=check)
+        if known.own.length > 0:
+            known = known._replace(odometry_check=_judged(known, memory, rules))
     ring = remember(memory.history, known.odometry, sample, rules.span)
     known = known._replace(odometry=ring)
     n = known.track.length
-    if not rules.reprocesses or n == 0:
+    if not rules.reprocesses or n == 0 or source_of(known.odometry_check) == TRACK:
         return known
     k, since_ns = sample_place(memory.history, ring, sample.stamp_ns), 0
     if k > 0:
@@ -244,7 +365,11 @@ def _with_odometry(known: Known, memory: Memory, rules: Rules, first: int) -> bo
     changed = False
     for k in range(first, known.track.length):
         point = point_at(memory.points, known.track, k)
-        motion = by_odometry(known, memory, rules, point.measurement.capture_ns)
+        capture_ns = point.measurement.capture_ns
+        if rules.source == AUTO:
+            motion = by_either_at(known, memory, rules, capture_ns)
+        else:
+            motion = by_odometry(known, memory, rules, capture_ns)
         changed = _put_motion(known, memory, k, point, motion) or changed
     return changed
 
@@ -259,7 +384,10 @@ def _with_own_motion(known: Known, memory: Memory, rules: Rules, first: int) -> 
         at = own_place(memory.own, known.own, capture_ns)
         if at < known.own.length:
             own = own_point(memory.own, known.own, at)
-            if own.capture_ns == capture_ns:
+            if own.capture_ns == capture_ns and rules.source == AUTO:
+                motion = by_either_at(known, memory, rules, capture_ns)
+                changed = _put_motion(known, memory, k, point, motion) or changed
+            elif own.capture_ns == capture_ns:
                 changed = _put_motion(known, memory, k, point, motion_of(own)) or changed
     return changed
 
@@ -288,6 +416,16 @@ def _own_again(known: Known, memory: Memory, rules: Rules, since_ns: int) -> Non
         due = own_reprocessed(due, by_odometry(known, memory, rules, due.capture_ns), noise)
         point = own_followed(own_point(memory.own, ring, k - 1), due, noise)
         store(memory.own, place(ring, memory.own, k), point)
+
+
+@kernel
+def is_under_way(known: Known, rules: Rules) -> bool:
+    """Whether there is all that estimates rest on: the leader's track, and motion of the follower."""
+    if known.track.length == 0:
+        return False
+    if rules.source == MOCAP:
+        return known.own.length > 0
+    return known.odometry.length > 0 or (rules.source == AUTO and known.own.length > 0)
 
 
 @kernel

@@ -26,30 +26,27 @@ def scale_in(values: Mapping[str, str]) -> float | None:
 
 
 def noise_report(estimate: NoiseEstimate, learning: NoiseLearning) -> dict[str, object]:
-    """Diagnostics of the noise, with a finding where it exceeds what is told; empty where it is given."""
+    """Diagnostics of the noise; empty where it is given."""
     if not learning.learns:
         return {}
     scale, found = estimate.scale, scaled_noise(learning.told, estimate)
-    values: dict[str, object] = {
+    return {
         NOISE_SCALE: scale_of(estimate, learning),
         "noise.scale_heading": round(scale.heading, _DIGITS),
         "noise.sigma_position": f"{found.position:.3g}",
         "noise.sigma_heading": f"{found.heading:.3g}",
     }
-    if exceeding := noise_finding(estimate, learning):
-        values["finding.noise"] = exceeding
-    return values
 
 
-def noise_finding(estimate: NoiseEstimate, learning: NoiseLearning) -> str:
+def noise_findings(estimate: NoiseEstimate, learning: NoiseLearning) -> dict[str, str]:
     """That the noise exceeds what is told by more than is certain, in a line; empty if it does not."""
     scale, told = estimate.scale, learning.told
     seen = [
-        f"{name} scatters by {ratio * sigma * by:.2g} {unit}, estimator.{key} says {sigma * by:.2g} {unit}"
-        for name, key, ratio, sigma, by, unit in (
-            ("position", "sigma_position", scale.position, told.position, 1e3, "mm"),
-            ("heading", "sigma_heading", scale.heading, told.heading, 1e3, "mrad"),
+        f"{name} scatters by {ratio * sigma * 1e3:.2g} {unit}, expected {sigma * 1e3:.2g} by estimator.{key}"
+        for name, key, ratio, sigma, unit in (
+            ("position", "sigma_position", scale.position, told.position, "mm"),
+            ("heading", "sigma_heading", scale.heading, told.heading, "mrad"),
         )
-        if ratio > REFUTED
+        if learning.learns and ratio > REFUTED
     ]
-    return "; ".join(seen)
+    return {"noise": "; ".join(seen)} if seen else {}

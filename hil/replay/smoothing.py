@@ -17,7 +17,7 @@ from formation.records import row_of
 from hil.nodes.estimator import NAME, EstimatorNode, EstimatorState
 from hil.nodes.node import Outgoing
 from hil.nodes.status_reasons import ALL_REASONS, reason_number
-from hil.scenario.leader_model import refuse_bias_states
+from hil.scenario.leader_model import refuse_bias_states, refuse_leader_lever
 from hil.scenario.schema import Scenario
 from hil.wire.certified_message import certified_message
 from hil.wire.events import Event
@@ -34,6 +34,7 @@ class ListeningEstimator(EstimatorNode):
 
     def __init__(self, scenario: Scenario, name: str = NAME, others: frozenset[str] = frozenset()) -> None:
         refuse_bias_states(scenario)
+        refuse_leader_lever(scenario)
         ekf = replace(scenario, estimator=replace(scenario.estimator, kind="ekf"))
         super().__init__(ekf, name, others)
         self.measurements: dict[int, Measurement] = {}

@@ -18,6 +18,9 @@ Span = Annotated[float, Meta(ge=0.0, le=1e5)]
 Probability = Annotated[float, Meta(ge=0.0, lt=1.0)]
 Name = Annotated[str, Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 PoseTriple = tuple[float, float, float]
+_Offset = Annotated[float, Meta(ge=-2.0, le=2.0)]
+_Yaw = Annotated[float, Meta(ge=-math.pi, le=math.pi)]
+MountTriple = tuple[_Offset, _Offset, _Yaw]
 
 LawName = Literal["independent", "ideal", "feedforward", "faded"]
 EstimatorName = Literal["ekf", "ukf", "ekf-filterpy", "ukf-filterpy", "imm", "shape-ekf", "mhe", "difference"]
@@ -26,7 +29,7 @@ OFFLINE_ESTIMATORS: tuple[OfflineName, ...] = get_args(OfflineName)
 LAW_NAMES: tuple[LawName, ...] = get_args(LawName)
 ESTIMATOR_NAMES: tuple[EstimatorName | OfflineName, ...] = (*get_args(EstimatorName), *OFFLINE_ESTIMATORS)
 FrontEnd = Literal["world", "body"]
-OwnMotion = Literal["odometry", "mocap", "fused"]
+OwnMotion = Literal["odometry", "mocap", "fused", "auto"]
 ClockName = Literal["trusted", "estimated"]
 NoiseName = Literal["estimated", "given"]
 
@@ -66,6 +69,8 @@ class ControllerSection(_Section, frozen=True, kw_only=True):
     the robot's link, into which commands are rounded so that nothing is lost on average; 0 for a link that
     carries any value. ``command_type``: what the robot takes.
     ``tilt``: how far [rad] a follower that a speed limit holds back may turn off its bearing to close in.
+    ``mount_check``: stop a follower whose body's heading is more than 5 degrees off its direction of travel,
+    or only warn of it, so that it can be driven to calibrate.
     A law of one's own is ``file.py:function`` or ``package.module:function``; ``parameters`` are its gains.
     """
 
@@ -84,6 +89,7 @@ class ControllerSection(_Section, frozen=True, kw_only=True):
     v_resolution: NonNegative = 0.0
     u_resolution: NonNegative = 0.0
     command_type: Literal["TwistStamped", "Twist"] = "TwistStamped"
+    mount_check: Literal["stop", "warn"] = "stop"
 
 
 class ConstantProgram(_Section, frozen=True, kw_only=True, tag="constant", tag_field="kind"):
@@ -126,6 +132,8 @@ class LeaderSection(_Section, frozen=True, kw_only=True):
     """The leader: its start pose (x, y, theta), its program and the limits that are known of it.
 
     ``v_eps <= v1 <= k_v`` and ``|u1| <= k_u`` (Assumption 1 of the paper).
+    ``mount``: where its rigid body sits on it, as far as is known: x [m] ahead of the middle of the wheel
+    axis, y [m] to the left of it, yaw [rad] from the robot's heading to the body's.
     """
 
     pose: PoseTriple
@@ -134,20 +142,41 @@ class LeaderSection(_Section, frozen=True, kw_only=True):
     v_eps: Positive = 0.02
     k_v: Positive
     k_u: Positive
+    mount: MountTriple = (0.0, 0.0, 0.0)
 
 
 class FollowerSection(_Section, frozen=True, kw_only=True):
-    """The follower: its start pose (x, y, theta) and its name on the wire."""
+    """The follower: its start pose (x, y, theta), its name on the wire, and its body's mount as the leader's.
+
+    In a chain every follower has this mount.
+    """
 
     pose: PoseTriple
     name: Name = "follower"
+    mount: MountTriple = (0.0, 0.0, 0.0)
+
+
+class OdometryFaultSection(_Section, frozen=True, kw_only=True):
+    """A fault of the emulated odometry of all followers, ``at_s`` after the leader set off.
+
+    ``silent``: no samples; ``nan``: a twist of NaN; ``zero``: a twist of 0 with a right pose; ``reversed``:
+    both with the opposite sign; ``scale``: both times ``factor``; ``delay``: samples come, and are stamped,
+    ``delay_s`` later; ``slip``: the share ``factor`` |u2| (u2 in rad/s, at most 0.9) of what the wheels turn
+    is lost; ``reset``: the pose begins anew at its origin, once. ``duration_s`` 0 stands for good.
+    """
+
+    kind: Literal["silent", "nan", "zero", "reversed", "scale", "delay", "slip", "reset"]
+    at_s: NonNegative
+    duration_s: NonNegative = 0.0
+    factor: float = 0.5
+    delay_s: Span = 0.2
 
 
 class RobotSection(_Section, frozen=True, kw_only=True):
     """The emulated robots: first-order actuator lag, limits, command resolution, wheel odometry.
 
     Odometry is noisy, stamped ``odometry_delay_s`` later than the motion that it tells of, and tells the
-    motion times ``odometry_scale_v`` and ``odometry_scale_u``.
+    motion times ``odometry_scale_v`` and ``odometry_scale_u``; its pose adds that up, without noise.
     """
 
     lag_s: NonNegative = 0.1
@@ -161,6 +190,7 @@ class RobotSection(_Section, frozen=True, kw_only=True):
     odometry_delay_s: Span = 0.0
     odometry_scale_v: Positive = 1.0
     odometry_scale_u: Positive = 1.0
+    odometry_faults: tuple[OdometryFaultSection, ...] = ()
 
 
 class FaultSection(_Section, frozen=True, kw_only=True):
@@ -184,6 +214,8 @@ class MocapSection(_Section, frozen=True, kw_only=True):
 
     Its clock is ahead of the host's by ``clock_offset_s``, runs faster by ``clock_drift_ppm``, and jumps by
     ``clock_jump_s`` when the leader has been driving for ``clock_jump_at_s``.
+    ``leader_mount``, ``follower_mount``: where the bodies really sit on the robots, as ``leader.mount`` says
+    what is known of it.
     """
 
     rate_hz: Rate = 120.0
@@ -197,6 +229,8 @@ class MocapSection(_Section, frozen=True, kw_only=True):
     clock_drift_ppm: Annotated[float, Meta(ge=-500.0, le=500.0)] = 0.0
     clock_jump_s: Annotated[float, Meta(ge=-1e7, le=1e7)] = 0.0
     clock_jump_at_s: NonNegative = 0.0
+    leader_mount: MountTriple = (0.0, 0.0, 0.0)
+    follower_mount: MountTriple = (0.0, 0.0, 0.0)
     faults: tuple[FaultSection, ...] = ()
 
 
