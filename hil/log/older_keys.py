@@ -11,6 +11,7 @@ from copy import deepcopy
 from typing import Any
 
 BEFORE: dict[str, Any] = {
+    "estimator.noise": "given",
     "controller.mount_check": "warn",
     "leader.mount": [0.0, 0.0, 0.0],
     "follower.mount": [0.0, 0.0, 0.0],

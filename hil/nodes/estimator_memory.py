@@ -45,6 +45,7 @@ from hil.scenario.leader_model import (
     follower_mount,
     input_trust,
     leader_filter,
+    noise_learning,
     own_noise,
     pose_noise,
     track_settings,
@@ -90,6 +91,7 @@ def rules_of(scenario: Scenario) -> Rules:
         noise=pose_noise(scenario),
         trust=input_trust(scenario),
         own_noise=own_noise(scenario),
+        noise_learning=noise_learning(scenario),
         mount=follower_mount(scenario),
     )
 

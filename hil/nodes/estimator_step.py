@@ -8,6 +8,15 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from estimation.consistency.noise_estimate import (
+    NOISE_GIVEN,
+    Moment,
+    NoiseEstimate,
+    NoiseLearning,
+    noise_with_frame,
+    noise_with_sighting,
+    scaled_noise,
+)
 from estimation.filters.filter import Filter
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import (
@@ -83,7 +92,7 @@ class Rules(NamedTuple):
 
     source: where the follower's motion is from. reprocesses: whether odometry that comes late is folded in
     again. span: seconds of odometry kept. noise: of a mocap pose. mount: of the follower's
-    body.
+    body. noise_learning: by what the noise is put right.
     """
 
     settings: TrackSettings
@@ -95,6 +104,7 @@ class Rules(NamedTuple):
     trust: InputTrust
     own_noise: OwnNoise
     mount: Mount = NO_MOUNT
+    noise_learning: NoiseLearning = NOISE_GIVEN
 
 
 class Memory(NamedTuple):
@@ -112,7 +122,8 @@ class Memory(NamedTuple):
 class Known(NamedTuple):
     """Where the rows are filled, by what odometry is corrected, and how far it is believed.
 
-    ``watched_ns``: capture of the first frame since when odometry is missed, 0 before.
+    ``watched_ns``: capture of the first frame since when odometry is missed, 0 before. ``noise``: of
+    measurements, as they tell it.
     """
 
     track: Ring
@@ -121,6 +132,7 @@ class Known(NamedTuple):
     correction: Correction
     odometry_check: OdometryCheck
     watched_ns: int
+    noise: NoiseEstimate
 
 
 class Taken(NamedTuple):
@@ -238,7 +250,39 @@ def take_not_finite(known: Known, now_ns: int) -> Known:
 
 @kernel
 def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
-    """Take in a mocap frame that was captured at a time by the host's clock."""
+    """Take in a mocap frame that was captured at a time by the host's clock.
+
+    It is taken with the noise as known from the frames before, and keeps that if it is folded again.
+    """
+    if not rules.noise_learning.learns:
+        return _take_frame(known, memory, rules, capture_ns, seen)
+    noise = scaled_noise(rules.noise, known.noise)
+    taken = _take_frame(known, memory, with_noise(rules, noise), capture_ns, seen)
+    if taken.late or taken.verdict == DUPLICATE or taken.verdict == LATE:
+        return taken
+    gated = taken.cause != BELIEVED
+    learned = noise_with_frame(known.noise, Moment(capture_ns, seen), gated, rules.noise_learning)
+    return taken._replace(known=taken.known._replace(noise=learned))
+
+
+@kernel
+def with_sight_noise(taken: Taken, memory: Memory, rules: Rules) -> Taken:
+    """The same with what a sighting that came in order tells of the sensor's noise."""
+    unused = taken.verdict == DUPLICATE or taken.verdict == LATE
+    if not rules.noise_learning.learns or taken.late or unused:
+        return taken
+    learned = noise_with_sighting(taken.known.noise, newest(memory.points, taken.known.track))
+    return taken._replace(known=taken.known._replace(noise=learned))
+
+
+@kernel
+def with_noise(rules: Rules, noise: PoseNoise) -> Rules:
+    """Rules by which poses have this noise."""
+    return rules._replace(noise=noise, own_noise=rules.own_noise._replace(pose=noise))
+
+
+@kernel
+def _take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
     if rules.source == ODOMETRY:
         motion = by_odometry(known, memory, rules, capture_ns)
         return take(known, memory, rules, measured(rules, capture_ns, seen, motion))

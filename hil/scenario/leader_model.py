@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from estimation.consistency.noise_estimate import NoiseLearning
 from estimation.filters.belief import Model
 from estimation.filters.estimator import Estimator
 from estimation.filters.estimators import make_estimator, settling
@@ -115,6 +116,14 @@ def track_settings(scenario: Scenario) -> TrackSettings:
 def pose_noise(scenario: Scenario) -> PoseNoise:
     """Noise of a mocap pose, as the estimator is told."""
     return PoseNoise(float(scenario.estimator.sigma_position), float(scenario.estimator.sigma_heading))
+
+
+def noise_learning(scenario: Scenario) -> NoiseLearning:
+    """Whether the noise of poses is put right by what frames tell of it."""
+    given, told = scenario.estimator, pose_noise(scenario)
+    # The literal way to compare with takes all as it is told.
+    learns = given.noise == "estimated" and given.kind != "difference"
+    return NoiseLearning(learns, told, float(scenario.leader.v_eps))
 
 
 def own_noise(scenario: Scenario) -> OwnNoise:

@@ -31,6 +31,7 @@ ESTIMATOR_NAMES: tuple[EstimatorName | OfflineName, ...] = (*get_args(EstimatorN
 FrontEnd = Literal["world", "body"]
 OwnMotion = Literal["odometry", "mocap", "fused", "auto"]
 ClockName = Literal["trusted", "estimated"]
+NoiseName = Literal["estimated", "given"]
 
 
 class _Section(Struct, frozen=True, forbid_unknown_fields=True):
@@ -242,6 +243,8 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``own_motion``: where v2 and u2 come from: odometry, the follower's own mocap track, both fused, or auto:
     odometry while the track bears it out, else the track.
     ``sigma_range``, ``sigma_bearing``: of a body-frame sensor; for mocap they follow from the geometry.
+    ``noise``: estimated puts ``sigma_position``, ``sigma_heading``, ``sigma_range`` and ``sigma_bearing``
+    right by what measurements tell, from a tenth to 30 times the value; given takes them as they stand.
     ``sensor_x``, ``sensor_y``: how far [m] such a sensor sits ahead of the middle of the follower's wheel
     axis and to its left. ``range_bias`` [m], ``bearing_bias`` [rad]: by how much its values are above the
     true ones.
@@ -266,6 +269,7 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     transport_latency_s: Span = 0.0
     stamp_offset_s: Annotated[float, Meta(ge=-1e5, le=1e5)] = 0.0
     align_odometry: bool = False
+    noise: NoiseName = "estimated"
     sigma_position: Positive = 0.0003
     sigma_heading: Positive = 0.0035
     sigma_range: Positive = 0.01
