@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controllers.follower import Command
+from estimation.consistency.process_estimate import MEMBERS, Member
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.own_motion.own_track import OwnPoint
 from estimation.tracking.estimate import Estimate
@@ -127,6 +128,7 @@ class Rooms(NamedTuple):
     points: Rows[TrackPoint]
     history: Rows[MotionSample]
     own: Rows[OwnPoint]
+    bank: Rows[Member]
     sent: Rows[SentCommand]
     orders: Rows[Order]
     waiting: Rows[KeptEstimate]
@@ -142,6 +144,7 @@ def tracks_of(rooms: Rooms, share: Share, k: int) -> Tracks:
         part(TrackPoint, rooms.points, k * share.points, share.points),
         part(MotionSample, rooms.history, k * share.history, share.history),
         part(OwnPoint, rooms.own, k * share.own, share.own),
+        part(Member, rooms.bank, k * MEMBERS, MEMBERS),
     )
 
 

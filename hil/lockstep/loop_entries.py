@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from estimation.consistency.process_estimate import Member
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.own_motion.own_track import OwnPoint
 from estimation.tracking.prediction import SentCommand
@@ -51,6 +52,7 @@ def fly(
     points: Rows[TrackPoint],
     history: Rows[MotionSample],
     own: Rows[OwnPoint],
+    bank: Rows[Member],
     sent: Rows[SentCommand],
     orders: Rows[Order],
     waiting: Rows[KeptEstimate],
@@ -65,8 +67,8 @@ def fly(
     )  # fmt: skip
     rooms = Rooms(
         lab, borrowed(clocks), borrowed(knowns), borrowed(controls), borrowed(rules),
-        borrowed(control_rules), borrowed(points), borrowed(history), borrowed(own), borrowed(sent),
-        borrowed(orders), borrowed(waiting), borrowed(truth), borrowed(estimates), borrowed(commands),
+        borrowed(control_rules), borrowed(points), borrowed(history), borrowed(own), borrowed(bank),
+        borrowed(sent), borrowed(orders), borrowed(waiting), borrowed(truth), borrowed(estimates), borrowed(commands),
     )  # fmt: skip
     flight = flown(load(Flight, flights, 0), load(Plan, plans, 0), rooms)
     store(flights, 0, flight)

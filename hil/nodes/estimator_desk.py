@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controllers.guard import CLOCK_TOLERANCE_NS
+from estimation.consistency.process_estimate import NOTHING_LEARNED, Member
 from estimation.models.measurement import PairSeen
 from estimation.own_motion.odometry_history import IDEAL, MotionSample
 from estimation.own_motion.own_track import OwnPoint
@@ -85,6 +86,7 @@ class Desk(NamedTuple):
     points: Rows[TrackPoint]
     history: Rows[MotionSample]
     own: Rows[OwnPoint]
+    bank: Rows[Member]
     known: Rows[Known]
     time: TimeRows
     notes: Rows[Notes]
@@ -102,7 +104,7 @@ class Desk(NamedTuple):
     @kernel
     def memory(self) -> Memory:
         """Where the tracks lie."""
-        return Memory(self.points, self.history, self.own)
+        return Memory(self.points, self.history, self.own, self.bank)
 
 
 @kernel
@@ -115,7 +117,7 @@ def noted(desk: Desk, digest: int, now_ns: int) -> bool:
     return now_ns >= notes.heard_ns - CLOCK_TOLERANCE_NS
 
 
-NOTHING_KNOWN = Known(EMPTY, EMPTY, EMPTY, IDEAL)
+NOTHING_KNOWN = Known(EMPTY, EMPTY, EMPTY, IDEAL, NOTHING_LEARNED)
 
 
 @kernel

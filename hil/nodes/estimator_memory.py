@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.consistency.process_estimate import MEMBERS, Member
 from estimation.filters.filter import Filter
 from estimation.own_motion.odometry_history import Correction, History, MotionSample
 from estimation.own_motion.own_track import OwnPoint
@@ -40,7 +41,14 @@ from hil.nodes.frame_time import time_rules
 from hil.nodes.node import Counts
 from hil.nodes.refusals import COUNTED, REFUSALS, TAKEN, TAKEN_FRAME
 from hil.nodes.status_reasons import ALL_REASONS
-from hil.scenario.leader_model import input_trust, leader_filter, own_noise, pose_noise, track_settings
+from hil.scenario.leader_model import (
+    input_trust,
+    leader_filter,
+    own_noise,
+    pose_noise,
+    process_learning,
+    track_settings,
+)
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire.assumed_errors import AssumedErrors
@@ -79,6 +87,7 @@ def rules_of(scenario: Scenario) -> Rules:
         noise=pose_noise(scenario),
         trust=input_trust(scenario),
         own_noise=own_noise(scenario),
+        process_learning=process_learning(scenario),
     )
 
 
@@ -127,6 +136,7 @@ class EstimatorMemory:
             points=make(TrackPoint, room),
             history=rows_of(MotionSample, room_for(rules.step.span)),
             own=rows_of(OwnPoint, room),
+            bank=rows_of(Member, MEMBERS),
             known=row_of(NOTHING_KNOWN),
             time=time_rows(),
             notes=row_of(NOTHING_NOTED),
@@ -158,7 +168,7 @@ class EstimatorMemory:
     def copy(self) -> EstimatorMemory:
         """The same memory, to go on from twice."""
         twin = EstimatorMemory(self.rules, self.reader, self._wanted, self._template)
-        for name in ("points", "history", "own", "known", "notes", "receipts", "counts", "newest"):
+        for name in ("points", "history", "own", "bank", "known", "notes", "receipts", "counts", "newest"):
             getattr(twin.desk, name)[:] = getattr(self.desk, name)
         for kept, other in zip(_columns(self.desk.time), _columns(twin.desk.time), strict=True):
             other[:] = kept

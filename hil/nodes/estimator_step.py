@@ -8,6 +8,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from estimation.consistency.process_estimate import (
+    LearnedProcess,
+    Member,
+    ProcessLearning,
+    learn,
+    learned_noise,
+    restarted,
+)
 from estimation.filters.filter import Filter
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import (
@@ -42,7 +50,7 @@ from estimation.own_motion.own_track import (
 from estimation.tracking.estimate import Estimate, estimate_at
 from estimation.tracking.follower_check import BELIEVED
 from estimation.tracking.follower_check import GATED as LEADER_OFF
-from estimation.tracking.track_point import DUPLICATE, GATED, LATE, TrackPoint
+from estimation.tracking.track_point import DUPLICATE, GATED, LATE, RESTARTED, USED, TrackPoint
 from estimation.tracking.tracker import (
     TrackSettings,
     add,
@@ -77,23 +85,29 @@ class Rules(NamedTuple):
     noise: PoseNoise
     trust: InputTrust
     own_noise: OwnNoise
+    process_learning: ProcessLearning
 
 
 class Memory(NamedTuple):
-    """Rows that an estimator works in: the leader's track, odometry, the follower's own track."""
+    """Rows that an estimator works in: the leader's track, odometry, the follower's own track, and the bank.
+
+    ``bank``: filters of other process noise, by which that is found.
+    """
 
     points: Rows[TrackPoint]
     history: Rows[MotionSample]
     own: Rows[OwnPoint]
+    bank: Rows[Member]
 
 
 class Known(NamedTuple):
-    """Where the rows are filled, and by what odometry is corrected."""
+    """Where the rows are filled, by what odometry is corrected, and what is known of the leader's driving."""
 
     track: Ring
     odometry: Ring
     own: Ring
     correction: Correction
+    process: LearnedProcess
 
 
 class Taken(NamedTuple):
@@ -166,9 +180,28 @@ def take(known: Known, memory: Memory, rules: Rules, measurement: Measurement) -
     """Take in a measurement of the leader."""
     points, ring = memory.points, known.track
     late = ring.length > 0 and measurement.capture_ns < capture_at(points, ring, ring.length - 1)
-    added = add(points, ring, measurement, rules.settings, rules.filter)
+    learning, estimator = rules.process_learning, rules.filter
+    if learning.on:
+        estimator = estimator.driven_by(learned_noise(known.process, learning))
+    added = add(points, ring, measurement, rules.settings, estimator)
     cause = added.cause if added.verdict == GATED else BELIEVED
-    return Taken(known._replace(track=added.ring), added.verdict, cause, late)
+    known = known._replace(track=added.ring)
+    if learning.on and not late:
+        known = known._replace(process=_learned(known, memory, rules, added.verdict))
+    return Taken(known, added.verdict, cause, late)
+
+
+@kernel
+def _learned(known: Known, memory: Memory, rules: Rules, verdict: int) -> LearnedProcess:
+    """What is known of the leader's driving with the newest point of its track in it."""
+    if verdict == RESTARTED:
+        return restarted(known.process)
+    if verdict != USED:
+        return known.process
+    point = newest(memory.points, known.track)
+    return learn(
+        known.process, memory.bank, point.measurement, point.belief, point.settled, rules.process_learning, rules.filter
+    )
 
 
 @kernel
