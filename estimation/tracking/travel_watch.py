@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from estimation.filters.gaussian import Gaussian, speed_of
 from estimation.models.coordinated_turn import LeaderLimits
+from estimation.tracking.track_point import GATED, RESTARTED, TrackPoint
 from formation.kernel import kernel
 
 _NS = 1e-9
@@ -56,3 +57,14 @@ def travelled(
     if watch.known and against and (watch.slowed or not may_have_turned):
         turned_ns = capture_ns
     return TravelWatch(True, belief.vx, belief.vy, capture_ns, False, turned_ns)
+
+
+@kernel
+def watched(watch: TravelWatch, point: TrackPoint, lost_after: float, limits: LeaderLimits) -> TravelWatch:
+    """Watch with the newest point of a track; one that begins anew after ``lost_after`` [s] knows nothing."""
+    if point.verdict == GATED:
+        return watch
+    capture_ns, unsure = point.measurement.capture_ns, point.verdict == RESTARTED and not point.settled
+    if unsure and (capture_ns - watch.at_ns) * _NS > lost_after:
+        return TravelWatch(False, 0.0, 0.0, 0, False, watch.turned_ns)
+    return travelled(watch, point.belief, capture_ns, point.settled, limits)
