@@ -264,4 +264,5 @@ def _own_again(known: Known, memory: Memory, rules: Rules, since_ns: int) -> Non
 def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) -> Told:
     """Newest estimate of a track that has one, its status as seen at ``now_ns``."""
     point = newest(points, known.track)
+    point = point._replace(belief=rules.filter.leader(point.belief, point.measurement))
     return Told(estimate_at(point, status_of(point, now_ns, rules.settings)), point.cause)
