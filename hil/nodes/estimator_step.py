@@ -483,5 +483,6 @@ def is_under_way(known: Known, rules: Rules) -> bool:
 def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) -> Told:
     """Newest estimate of a track that has one, its status as seen at ``now_ns``."""
     point = newest(points, known.track)
+    point = point._replace(belief=rules.filter.leader(point.belief, point.measurement))
     told = estimate_at(point, status_of(point, now_ns, rules.settings))
     return Told(guessed_when_slow(told, rules.filter.limits.v_eps), point.cause)
