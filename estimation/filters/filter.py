@@ -30,6 +30,7 @@ class Kind(IntEnum):
     DIFFERENCE = 2
 
 
+EKF = Kind.EKF.value
 UKF = Kind.UKF.value
 DIFFERENCE = Kind.DIFFERENCE.value
 
@@ -61,6 +62,11 @@ class Filter(NamedTuple):
         """The same model for estimators in matrices."""
         front_end = FrontEnd.WORLD if self.in_world else FrontEnd.BODY
         return Model(front_end, self.limits, self.noise, self.correlation, self.lever)
+
+    @kernel
+    def driven_by(self, noise: ProcessNoise) -> Filter:
+        """The same filter for a leader that is driven by other noise."""
+        return self._replace(noise=noise)
 
     @kernel
     def start(self, measurement: Measurement) -> Gaussian:

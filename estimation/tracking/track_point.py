@@ -8,9 +8,10 @@ from typing import NamedTuple
 
 from estimation.filters.filter import Filter
 from estimation.filters.gaussian import Gaussian
-from estimation.models.coordinated_turn import FollowerMotion
+from estimation.models.coordinated_turn import FollowerMotion, ProcessNoise
 from estimation.models.measurement import Measurement
 from estimation.tracking.follower_check import BELIEVED, FollowerCheck, check_from
+from estimation.tracking.manoeuvre import Manoeuvre, steady
 from formation.kernel import kernel
 from formation.pose import Pose
 
@@ -73,6 +74,7 @@ class TrackPoint(NamedTuple):
 
     verdict: a :class:`Verdict`; cause: why the measurement was not used, a
     :class:`~estimation.tracking.follower_check.Cause`. used_ns: capture time of the newest one that was used.
+    noise: what the leader was taken to be driven by. manoeuvre: what innovations tell of jumps of its motion.
     """
 
     measurement: Measurement
@@ -85,6 +87,8 @@ class TrackPoint(NamedTuple):
     check: FollowerCheck
     cause: int
     jump: JumpUncertainty
+    noise: ProcessNoise
+    manoeuvre: Manoeuvre
 
 
 @kernel
@@ -108,4 +112,6 @@ def begun(measurement: Measurement, estimator: Filter) -> TrackPoint:
         check_from(measurement),
         BELIEVED,
         JumpUncertainty(0.0, 0.0, 0),
+        estimator.noise,
+        steady(),
     )

@@ -19,6 +19,7 @@ BEFORE: dict[str, Any] = {
     "mocap.follower_mount": [0.0, 0.0, 0.0],
     "robot.odometry_faults": [],
     "estimator.own_motion": "odometry",
+    "estimator.process_noise": "given",
 }
 """Value of ``section.key`` for logs without it; a test asks for every key that a reference log lacks."""
 

@@ -17,6 +17,14 @@ from estimation.consistency.noise_estimate import (
     noise_with_sighting,
     scaled_noise,
 )
+from estimation.consistency.process_estimate import (
+    LearnedProcess,
+    Member,
+    ProcessLearning,
+    learn,
+    learned_noise,
+    restarted,
+)
 from estimation.filters.filter import Filter
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import (
@@ -64,7 +72,7 @@ from estimation.tracking.estimate import Estimate, estimate_at
 from estimation.tracking.follower_check import BELIEVED
 from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
 from estimation.tracking.follower_check import GATED as LEADER_OFF
-from estimation.tracking.track_point import DUPLICATE, GATED, LATE, TrackPoint
+from estimation.tracking.track_point import DUPLICATE, GATED, LATE, RESTARTED, USED, TrackPoint
 from estimation.tracking.tracker import (
     TrackSettings,
     add,
@@ -103,27 +111,30 @@ class Rules(NamedTuple):
     noise: PoseNoise
     trust: InputTrust
     own_noise: OwnNoise
+    process_learning: ProcessLearning
     mount: Mount = NO_MOUNT
     noise_learning: NoiseLearning = NOISE_GIVEN
 
 
 class Memory(NamedTuple):
-    """Rows that an estimator works in: the leader's track, odometry, the follower's own track, and the ways.
+    """Rows that an estimator works in: the leader's track, odometry, the follower's own track, and more.
 
-    By the ``ways`` that both have gone odometry is judged.
+    By the ``ways`` that both have gone odometry is judged. ``bank``: filters of other process noise, by which
+    that is found.
     """
 
     points: Rows[TrackPoint]
     history: Rows[MotionSample]
     own: Rows[OwnPoint]
     ways: Rows[WayEntry]
+    bank: Rows[Member]
 
 
 class Known(NamedTuple):
     """Where the rows are filled, by what odometry is corrected, and how far it is believed.
 
     ``watched_ns``: capture of the first frame since when odometry is missed, 0 before. ``noise``: of
-    measurements, as they tell it.
+    measurements, as they tell it. ``process``: what is known of how the leader drives.
     """
 
     track: Ring
@@ -133,6 +144,7 @@ class Known(NamedTuple):
     odometry_check: OdometryCheck
     watched_ns: int
     noise: NoiseEstimate
+    process: LearnedProcess
 
 
 class Taken(NamedTuple):
@@ -326,9 +338,34 @@ def take(known: Known, memory: Memory, rules: Rules, measurement: Measurement) -
     """Take in a measurement of the leader."""
     points, ring = memory.points, known.track
     late = ring.length > 0 and measurement.capture_ns < capture_at(points, ring, ring.length - 1)
-    added = add(points, ring, measurement, rules.settings, rules.filter)
+    learning, estimator = rules.process_learning, rules.filter
+    if learning.on:
+        estimator = estimator.driven_by(learned_noise(known.process, learning))
+    added = add(points, ring, measurement, rules.settings, estimator)
     cause = added.cause if added.verdict == GATED else BELIEVED
-    return Taken(known._replace(track=added.ring), added.verdict, cause, late)
+    known = known._replace(track=added.ring)
+    if learning.on and not late:
+        known = known._replace(process=_learned(known, memory, rules, added.verdict))
+    return Taken(known, added.verdict, cause, late)
+
+
+@kernel
+def _learned(known: Known, memory: Memory, rules: Rules, verdict: int) -> LearnedProcess:
+    """What is known of the leader's driving with the newest point of its track in it."""
+    if verdict == RESTARTED:
+        return restarted(known.process)
+    if verdict != USED:
+        return known.process
+    point = newest(memory.points, known.track)
+    return learn(
+        known.process,
+        memory.bank,
+        point.measurement,
+        point.belief,
+        point.settled,
+        rules.process_learning,
+        rules.filter,
+    )
 
 
 @kernel

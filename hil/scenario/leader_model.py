@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from estimation.consistency.noise_estimate import NoiseLearning
+from estimation.consistency.process_estimate import ProcessLearning
 from estimation.filters.belief import Model
 from estimation.filters.estimator import Estimator
 from estimation.filters.estimators import make_estimator, settling
@@ -30,6 +31,19 @@ def process_noise(scenario: Scenario) -> ProcessNoise:
     """Noise of the leader's motion, by rule."""
     given = scenario.estimator
     return ProcessNoise.by_rule(leader_limits(scenario), given.turn_bandwidth, given.speed_bandwidth)
+
+
+def finds_process_noise(scenario: Scenario) -> bool:
+    """Whether process noise is found by what is seen: only the filters that are records take another one."""
+    given = scenario.estimator
+    return given.process_noise == "estimated" and given.kind in ("ekf", "ukf") and not given.bias_states
+
+
+def process_learning(scenario: Scenario) -> ProcessLearning:
+    """How the leader's process noise is found, if it is."""
+    limits = leader_limits(scenario)
+    speed, turn = limits.k_v * limits.k_v, limits.k_u * limits.k_u
+    return ProcessLearning(finds_process_noise(scenario), process_noise(scenario), speed, turn)
 
 
 def leader_model(scenario: Scenario) -> Model:
@@ -109,6 +123,7 @@ def track_settings(scenario: Scenario) -> TrackSettings:
         coast_after=float(given.coast_after_s),
         lost_after=float(given.lost_after_s),
         window=float(given.window_s),
+        notices_manoeuvres=finds_process_noise(scenario),
         **settling(given.kind)._asdict(),
     )
 

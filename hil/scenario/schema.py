@@ -30,6 +30,7 @@ LAW_NAMES: tuple[LawName, ...] = get_args(LawName)
 ESTIMATOR_NAMES: tuple[EstimatorName | OfflineName, ...] = (*get_args(EstimatorName), *OFFLINE_ESTIMATORS)
 FrontEnd = Literal["world", "body"]
 OwnMotion = Literal["odometry", "mocap", "fused", "auto"]
+ProcessNoiseSource = Literal["estimated", "given"]
 ClockName = Literal["trusted", "estimated"]
 NoiseName = Literal["estimated", "given"]
 
@@ -256,6 +257,8 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``stamp_offset_s``: by how much trusted stamps are later than the robot's clock was at the capture.
     ``speed_bandwidth``: q_v = speed_bandwidth * k_v^2 per second (0.01 for leaders that drive evenly, 0.1
     for those that stop and go every few seconds).
+    ``process_noise``: estimated finds both bandwidths by what is seen of the leader, from the given ones on, and
+    notices steps of its speed and turn rate (``ekf``, ``ukf``); given takes them as they are.
     ``align_odometry``: odometry is corrected by the delay and scales that the follower's mocap track shows.
     ``certify``: publish a guaranteed error radius of v1 and alpha1 beside every estimate.
     ``kind`` smoother is for replays only; an estimator of one's own is ``file.py:factory`` or
@@ -287,6 +290,7 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     input_lag_s: NonNegative = 0.0
     turn_bandwidth: Positive = 0.5
     speed_bandwidth: Positive = 0.01
+    process_noise: ProcessNoiseSource = "estimated"
     gate_probability: Annotated[float, Meta(gt=0.5, lt=1.0)] = 0.9999
     reacquire_frames: Annotated[int, Meta(ge=2)] = 5
     coast_after_s: Positive = 0.25
