@@ -82,7 +82,7 @@ class Filter(NamedTuple):
     def predict(self, belief: Gaussian, dt: float, follower: FollowerMotion) -> Gaussian:
         """Belief after dt [s], the follower having moved as given."""
         ahead = unscented_carried(belief, dt) if self.kind == UKF else extended_carried(belief, dt)
-        if self.lever.is_none():
+        if self.lever.vanishes():
             ahead = driven(ahead, mean_of(belief), dt, self.noise)
         else:
             ahead = self._driven_by_body(ahead, belief, dt)
@@ -112,7 +112,7 @@ class Filter(NamedTuple):
 
     @kernel
     def _shows_body(self, measurement: Measurement) -> bool:
-        return measurement.framed and not self.lever.is_none()
+        return measurement.framed and not self.lever.vanishes()
 
     @kernel(inline=False)
     def _informed_by_body(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
