@@ -82,7 +82,7 @@ class Filter(NamedTuple):
             ahead = unscented_moved(belief, dt, self.noise)
         else:
             ahead = extended_moved(belief, dt, self.noise)
-        if not self.lever.is_none():
+        if not self.lever.vanishes():
             ahead = swung(ahead, belief, self.lever, self.limits.v_eps, self.noise.q_u, dt)
         if self.kind == DIFFERENCE:
             rates = belief.rates
@@ -102,7 +102,7 @@ class Filter(NamedTuple):
     @kernel
     def leader(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
         """Belief about the leader itself, the newest measurement being given; sightings see no body."""
-        if self.lever.is_none() or not measurement.framed:
+        if self.lever.vanishes() or not measurement.framed:
             return belief
         return robot_under(belief, self.lever, self.limits.v_eps)
 

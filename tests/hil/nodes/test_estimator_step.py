@@ -74,7 +74,7 @@ def rules(kind: Kind, front_end: FrontEnd, source: int) -> Rules:
         NOISE,
         InputTrust(5e-3, 3e-2, delay=0.004, lag=0.03, v_max=0.2, u_max=0.6),
         OwnNoise(NOISE, 0.2, 0.6),
-        NoiseLearning(kind is not Kind.DIFFERENCE, NOISE, 0.04),
+        noise_learning=NoiseLearning(kind is not Kind.DIFFERENCE, NOISE, 0.04),
     )
 
 
