@@ -68,7 +68,8 @@ def fly(
     rooms = Rooms(
         lab, borrowed(clocks), borrowed(knowns), borrowed(controls), borrowed(rules),
         borrowed(control_rules), borrowed(points), borrowed(history), borrowed(own), borrowed(bank),
-        borrowed(sent), borrowed(orders), borrowed(waiting), borrowed(truth), borrowed(estimates), borrowed(commands),
+        borrowed(sent), borrowed(orders), borrowed(waiting), borrowed(truth), borrowed(estimates),
+        borrowed(commands),
     )  # fmt: skip
     flight = flown(load(Flight, flights, 0), load(Plan, plans, 0), rooms)
     store(flights, 0, flight)

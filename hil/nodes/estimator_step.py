@@ -200,7 +200,13 @@ def _learned(known: Known, memory: Memory, rules: Rules, verdict: int) -> Learne
         return known.process
     point = newest(memory.points, known.track)
     return learn(
-        known.process, memory.bank, point.measurement, point.belief, point.settled, rules.process_learning, rules.filter
+        known.process,
+        memory.bank,
+        point.measurement,
+        point.belief,
+        point.settled,
+        rules.process_learning,
+        rules.filter,
     )
 
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 import pytest
 
 from controllers.guard import CLOCK_TOLERANCE_NS
+from estimation.consistency.process_estimate import NOTHING_LEARNED
 from estimation.own_motion.odometry_history import Correction
 from formation.records import load, store
 from formation.ring import EMPTY, Ring
@@ -42,12 +43,18 @@ def test_at_the_begin_nothing_is_noted() -> None:
 def test_tracks_and_odometry_lie_where_they_are_named() -> None:
     desk = memory().desk
     found = desk.memory()
-    assert all(a is b for a, b in zip(found, (desk.points, desk.history, desk.own), strict=True))
-    assert Memory._fields == ("points", "history", "own")
+    assert all(a is b for a, b in zip(found, (desk.points, desk.history, desk.own, desk.bank), strict=True))
+    assert Memory._fields == ("points", "history", "own", "bank")
 
 
 def filled(desk: Desk) -> Known:
-    known = Known(Ring(1, 2), Ring(3, 4), Ring(5, 6), Correction(0.01, 0.1, 0.2))
+    known = Known(
+        Ring(1, 2),
+        Ring(3, 4),
+        Ring(5, 6),
+        Correction(0.01, 0.1, 0.2),
+        NOTHING_LEARNED._replace(speed=0.5, turn=2.0),
+    )
     store(desk.known, 0, known)
     return known
 
