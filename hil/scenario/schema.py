@@ -257,8 +257,8 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``stamp_offset_s``: by how much trusted stamps are later than the robot's clock was at the capture.
     ``speed_bandwidth``: q_v = speed_bandwidth * k_v^2 per second (0.01 for leaders that drive evenly, 0.1
     for those that stop and go every few seconds).
-    ``process_noise``: estimated finds both bandwidths by what is seen of the leader, from the given ones on, and
-    notices steps of its speed and turn rate (``ekf``, ``ukf``); given takes them as they are.
+    ``process_noise``: estimated finds both bandwidths by what is seen of the leader, from the given ones on,
+    and notices steps of its speed and turn rate (``ekf``, ``ukf``); given takes them as they are.
     ``align_odometry``: odometry is corrected by the delay and scales that the follower's mocap track shows.
     ``certify``: publish a guaranteed error radius of v1 and alpha1 beside every estimate.
     ``kind`` smoother is for replays only; an estimator of one's own is ``file.py:factory`` or
