@@ -14,6 +14,7 @@ from estimation.filters.belief import Model
 from estimation.filters.difference import differenced, first_difference
 from estimation.filters.ekf import driven, extended_carried, informed, mean_of, seen_by_follower
 from estimation.filters.gaussian import Gaussian, nis_of, started
+from estimation.filters.leader_prior import standing_noise, within_limits
 from estimation.filters.lever_arm import NO_LEVER, Lever, at_body, at_robot
 from estimation.filters.ukf import unscented_carried
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, moved
@@ -44,6 +45,7 @@ class Stepped(NamedTuple):
 class Filter(NamedTuple):
     """A filter of a kind: ``in_world`` or along the follower's axes, with limits and noise of the leader.
 
+    Along the follower's axes, where sensors and odometry say less, the leader's limits are told all along.
     ``correlation`` [s]: of the errors of v2 and u2. ``cutoff`` [s]: of the low-pass behind differences.
     ``lever``: where the body that mocap frames show sits on the leader; differences know none.
     """
@@ -76,17 +78,19 @@ class Filter(NamedTuple):
     def predict(self, belief: Gaussian, dt: float, follower: FollowerMotion) -> Gaussian:
         """Belief after dt [s], the follower having moved as given."""
         ahead = unscented_carried(belief, dt) if self.kind == UKF else extended_carried(belief, dt)
+        noise = self.noise if self.in_world else standing_noise(belief, self.noise)
         if self.lever.is_none():
-            ahead = driven(ahead, mean_of(belief), dt, self.noise)
+            ahead = driven(ahead, mean_of(belief), dt, noise)
         else:
-            ahead = self._driven_by_body(ahead, belief, dt)
+            ahead = self._driven_by_body(ahead, belief, dt, noise)
         if self.kind == DIFFERENCE:
             rates = belief.rates
             ahead = ahead._replace(rates=rates._replace(elapsed=rates.elapsed + dt))
         if self.in_world:
             return ahead
         centre = moved(mean_of(belief), swing(belief.u, dt))
-        return seen_by_follower(ahead, centre, dt, follower, self.correlation)
+        seen = seen_by_follower(ahead, centre, dt, follower, self.correlation)
+        return seen if self.kind == DIFFERENCE else within_limits(seen, dt, self.noise, self.limits)
 
     @kernel
     def update(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
@@ -115,13 +119,15 @@ class Filter(NamedTuple):
         return at_robot(after, self.lever, self.limits.v_eps)
 
     @kernel(inline=False)
-    def _driven_by_body(self, ahead: Gaussian, before: Gaussian, dt: float) -> Gaussian:
+    def _driven_by_body(
+        self, ahead: Gaussian, before: Gaussian, dt: float, noise: ProcessNoise
+    ) -> Gaussian:
         """Noise across the direction of travel stands for a direction that is not trusted, not for turning.
 
         So it must not swing the body about: it goes into the belief about the body.
         """
         body = at_body(ahead, self.lever, self.limits.v_eps)
-        return at_robot(driven(body, mean_of(before), dt, self.noise), self.lever, self.limits.v_eps)
+        return at_robot(driven(body, mean_of(before), dt, noise), self.lever, self.limits.v_eps)
 
     @kernel
     def step(

@@ -14,9 +14,11 @@ from estimation.models.measurement import (
     Measurement,
     PairSeen,
     PoseNoise,
+    measure_body_anchored,
     measure_body_from_mocap,
     measure_world,
 )
+from estimation.own_motion.interval_motion import motion_between
 from estimation.own_motion.judged_odometry import FRESH, age_of, aged, is_better, with_own_track
 from estimation.own_motion.odometry_check import (
     POSE,
@@ -268,7 +270,25 @@ def measured(rules: Rules, capture_ns: int, seen: PairSeen, motion: FollowerMoti
     leader = (seen.leader_x, seen.leader_y)
     if rules.filter.in_world:
         return measure_world(capture_ns, leader, seen.follower, rules.noise, motion)
+    if rules.source == MOCAP:
+        return measure_body_anchored(capture_ns, leader, seen.follower, rules.noise, motion)
     return measure_body_from_mocap(capture_ns, leader, seen.follower, rules.noise, motion)
+
+
+@kernel
+def _with_way(known: Known, memory: Memory, rules: Rules, measurement: Measurement, k: int) -> Measurement:
+    """Measurement, the track's k-th, with the way by odometry since the one before, where that counts."""
+    if rules.filter.in_world or measurement.anchored or k == 0 or known.odometry.length == 0:
+        return measurement
+    to_ns = measurement.capture_ns
+    if measurement.framed and rules.source != ODOMETRY:
+        if rules.source != AUTO or not _is_fresh(known, rules, to_ns):
+            return measurement._replace(has_way=False)
+    from_ns = capture_at(memory.points, known.track, k - 1)
+    if from_ns >= to_ns:
+        return measurement
+    way = motion_between(memory.history, known.odometry, (from_ns, to_ns), rules.trust, known.correction)
+    return measurement._replace(has_way=True, way=way)
 
 
 @kernel
@@ -276,9 +296,19 @@ def take(known: Known, memory: Memory, rules: Rules, measurement: Measurement) -
     """Take in a measurement of the leader."""
     points, ring = memory.points, known.track
     late = ring.length > 0 and measurement.capture_ns < capture_at(points, ring, ring.length - 1)
+    before = place_of(points, ring, measurement.capture_ns)
+    measurement = _with_way(known, memory, rules, measurement, before)
     added = add(points, ring, measurement, rules.settings, rules.filter)
+    known = known._replace(track=added.ring)
     cause = added.cause if added.verdict == GATED else BELIEVED
-    return Taken(known._replace(track=added.ring), added.verdict, cause, late)
+    if late and measurement.has_way and added.verdict != DUPLICATE and added.verdict != LATE:
+        # What comes after it has a shorter way now.
+        k = place_of(points, added.ring, measurement.capture_ns) + 1
+        after = point_at(points, added.ring, k).measurement
+        shorter = _with_way(known, memory, rules, after, k)
+        if _put_measurement(known, memory, k, shorter):
+            reprocessed(points, added.ring, k, rules.settings, rules.filter)
+    return Taken(known, added.verdict, cause, late)
 
 
 @kernel
@@ -326,7 +356,9 @@ def _with_odometry(known: Known, memory: Memory, rules: Rules, first: int) -> bo
             motion = by_either_at(known, memory, rules, capture_ns)
         else:
             motion = by_odometry(known, memory, rules, capture_ns)
-        changed = _put_motion(known, memory, k, point, motion) or changed
+        measurement = with_motion(point, motion).measurement
+        measurement = _with_way(known, memory, rules, measurement, k)
+        changed = _put_measurement(known, memory, k, measurement) or changed
     return changed
 
 
@@ -350,16 +382,24 @@ def _with_own_motion(known: Known, memory: Memory, rules: Rules, first: int) -> 
 
 @kernel
 def _put_motion(known: Known, memory: Memory, k: int, point: TrackPoint, motion: FollowerMotion) -> bool:
-    was = point.measurement.motion
-    same = (
-        was.v2 == motion.v2
-        and was.u2 == motion.u2
-        and was.sd_v2 == motion.sd_v2
-        and was.sd_u2 == motion.sd_u2
-    )
+    return _put_measurement(known, memory, k, with_motion(point, motion).measurement)
+
+
+@kernel
+def _put_measurement(known: Known, memory: Memory, k: int, measurement: Measurement) -> bool:
+    """Put another motion and way of the follower in at a point; whether they are other ones."""
+    point = point_at(memory.points, known.track, k)
+    was = point.measurement
+    same = _same_motion(was.motion, measurement.motion) and _same_motion(was.way, measurement.way)
+    same = same and was.has_way == measurement.has_way
     if not same:
-        store(memory.points, place(known.track, memory.points, k), with_motion(point, motion))
+        store(memory.points, place(known.track, memory.points, k), point._replace(measurement=measurement))
     return not same
+
+
+@kernel
+def _same_motion(a: FollowerMotion, b: FollowerMotion) -> bool:
+    return a.v2 == b.v2 and a.u2 == b.u2 and a.sd_v2 == b.sd_v2 and a.sd_u2 == b.sd_u2
 
 
 @kernel
