@@ -31,6 +31,7 @@ class Kind(IntEnum):
     DIFFERENCE = 2
 
 
+EKF = Kind.EKF.value
 UKF = Kind.UKF.value
 DIFFERENCE = Kind.DIFFERENCE.value
 
@@ -63,6 +64,11 @@ class Filter(NamedTuple):
         """The same model for estimators in matrices."""
         front_end = FrontEnd.WORLD if self.in_world else FrontEnd.BODY
         return Model(front_end, self.limits, self.noise, self.correlation, self.lever)
+
+    @kernel
+    def driven_by(self, noise: ProcessNoise) -> Filter:
+        """The same filter for a leader that is driven by other noise."""
+        return self._replace(noise=noise)
 
     @kernel
     def start(self, measurement: Measurement) -> Gaussian:
@@ -119,9 +125,7 @@ class Filter(NamedTuple):
         return at_robot(after, self.lever, self.limits.v_eps)
 
     @kernel(inline=False)
-    def _driven_by_body(
-        self, ahead: Gaussian, before: Gaussian, dt: float, noise: ProcessNoise
-    ) -> Gaussian:
+    def _driven_by_body(self, ahead: Gaussian, before: Gaussian, dt: float, noise: ProcessNoise) -> Gaussian:
         """Noise across the direction of travel stands for a direction that is not trusted, not for turning.
 
         So it must not swing the body about: it goes into the belief about the body.

@@ -80,7 +80,12 @@ def motion_between(
     for k in range(delays):
         shift_ns = math.floor(trust.lag * k / (_DELAYS - 1) / _NS + 0.5)
         way = travelled(history, ring, from_ns - shift_ns, to_ns - shift_ns)
-        v, u, vv, uu = v + way.v * by, u + way.u * by, vv + way.v * by * way.v * by, uu + way.u * by * way.u * by
+        v, u, vv, uu = (
+            v + way.v * by,
+            u + way.u * by,
+            vv + way.v * by * way.v * by,
+            uu + way.u * by * way.u * by,
+        )
     v, u = v / delays, u / delays
     late_v, late_u = max(0.0, vv / delays - v * v), max(0.0, uu / delays - u * u)
     v, u = correction.scale_v * v, correction.scale_u * u

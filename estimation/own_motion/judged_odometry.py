@@ -7,16 +7,16 @@ import math
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.own_motion.odometry_check import (
     OdometryCheck,
-    SourceCheck,
     WayEntry,
     awaits_track,
+    no_sums,
     way_entry,
     window_of,
     with_track,
     without_track,
 )
 from estimation.own_motion.odometry_delay import delay_of, misfit_of, tight_variances
-from estimation.own_motion.odometry_history import IDEAL, InputTrust, delay_ns
+from estimation.own_motion.odometry_history import InputTrust
 from estimation.own_motion.own_track import OwnNoise, OwnPoint, own_place, own_point
 from formation.angles import wrapped
 from formation.kernel import kernel
@@ -27,8 +27,8 @@ from formation.ring import Ring
 _APART = 0.3  # [s]; two poses further apart tell nothing of the moment in between
 _DOUBTS = 9.21  # chi-square quantile of 0.99 with 2 degrees of freedom, of a mean: far above any healthy one
 _NS = 1e-9
-FRESH = 2.0
-"""Periods of odometry within which a sample has not aged."""
+_FRESH = 2.0  # periods of odometry
+_FIRST_PERIOD = 0.1  # [s] that is taken for granted while a sample is the only one
 
 
 @kernel(inline=False)
@@ -41,7 +41,7 @@ def with_own_track(
     trust: InputTrust,
 ) -> OdometryCheck:
     """Check with all that the track now tells of the moments at which odometry was added up."""
-    later_ns = delay_ns(trust, IDEAL)
+    later_ns = lateness_ns(trust)
     while awaits_track(check):
         at_ns = way_entry(entries, check.entries, check.paired).stamp_ns + later_ns
         k = own_place(own, ring, at_ns)
@@ -90,14 +90,27 @@ def _doubted(
         if doubt > _DOUBTS:
             return check
         # What has told of another moment is not trusted at once, even if it now looks well.
-        return check._replace(late=0.0, by_twist=SourceCheck(0.0, 0, False))
+        by_twist = check.by_twist._replace(excess=0.0, borne_out=0, trusted=False)
+        return check._replace(late=0.0, by_twist=by_twist, v=no_sums(), u=no_sums())
     return check._replace(late=late)
+
+
+@kernel
+def lateness_ns(trust: InputTrust) -> int:
+    """By how much the motion comes after its signal [ns]."""
+    return math.floor(trust.delay / _NS + 0.5)
 
 
 @kernel
 def age_of(check: OdometryCheck, capture_ns: int, trust: InputTrust) -> float:
     """How long [s] before a capture the motion was of which the newest sample tells; 0 if it was not."""
-    return max(0.0, (capture_ns - check.last.stamp_ns - delay_ns(trust, IDEAL)) * _NS)
+    return max(0.0, (capture_ns - check.last.stamp_ns - lateness_ns(trust)) * _NS)
+
+
+@kernel
+def fresh_for(check: OdometryCheck) -> float:
+    """How long [s] a sample is as good as new: two periods of odometry."""
+    return _FRESH * (check.period if check.period > 0.0 else _FIRST_PERIOD)
 
 
 @kernel
@@ -107,7 +120,7 @@ def aged(motion: FollowerMotion, check: OdometryCheck, age: float, noise: OwnNoi
     As on the track, v and u are driven by white noise of v_max^2 and u_max^2 per second, from two periods of
     odometry on.
     """
-    over = age - FRESH * check.period
+    over = age - fresh_for(check)
     if over <= 0.0:
         return motion
     sd_v = math.sqrt(motion.sd_v2 * motion.sd_v2 + noise.v_max * noise.v_max * over)

@@ -32,8 +32,9 @@ SCALE = 0.05
 _LEVER = 0.01  # [m]; the body's origin is put over the wheel axis within about this
 _SMALL, _LARGE = 9.21, 27.63  # chi-square quantiles of 0.99 and 0.999999 with 2 degrees of freedom
 _REFUTED = 18.42  # their difference, also the quantile of 0.9999: no single window reaches it
-_BORNE_OUT = 4  # windows
-_FORGETS = 0.8  # share of sums that is left after a window
+_MOST_NEEDED = 64  # windows
+_FORGETS = 0.9  # share of sums that is left after a window
+_ALIKE = 0.8  # squared correlation above which a channel is the motion by another scale
 _GAP = 1.0  # [s] without a sample or a pose, over which nothing is added up
 _HALF_SMALL = 1e-6
 _NS = 1e-9
@@ -69,19 +70,31 @@ class WayEntry(NamedTuple):
 
 
 class SourceCheck(NamedTuple):
-    """How far a source is believed. excess: of its misfits. borne_out: windows in a row that speak for it."""
+    """How far a source is believed.
+
+    excess: of its misfits. borne_out: windows in a row that speak for it. needs: how many of these a refuted
+    one needs; every time that it is refuted again, twice as many.
+    """
 
     excess: float
     borne_out: int
+    needs: int
     trusted: bool
 
 
 class Sums(NamedTuple):
-    """Squares and products of what is told and what the track shows, of one channel, since doubt began."""
+    """Squares and products of what is told and what the track shows, of one channel, since doubt began.
+
+    slipped: of what is told and what the track shows times its turn rate's size; by_slip: of the latter with
+    what the track shows; slip: its square. misfit: chi-square.
+    """
 
     told: float
     both: float
     shown: float
+    slipped: float
+    by_slip: float
+    slip: float
     misfit: float
 
 
@@ -120,8 +133,8 @@ class OdometryCheck(NamedTuple):
 
 _NO_WAY = Ways(0.0, 0.0)
 _NO_ENTRY = WayEntry(0, _NO_WAY, _NO_WAY, _NO_WAY)
-_BELIEVED = SourceCheck(0.0, 0, True)
-_NO_SUMS = Sums(0.0, 0.0, 0.0, 0.0)
+_BELIEVED = SourceCheck(0.0, 0, 2, True)
+NO_SUMS = Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _NO_SAMPLE = OdometrySample(0, 0.0, 0.0, False, Pose(0.0, 0.0, 0.0))
 UNCHECKED = OdometryCheck(
     heard=False,
@@ -137,8 +150,8 @@ UNCHECKED = OdometryCheck(
     since=_NO_ENTRY,
     by_twist=_BELIEVED,
     by_pose=_BELIEVED,
-    v=_NO_SUMS,
-    u=_NO_SUMS,
+    v=NO_SUMS,
+    u=NO_SUMS,
     late=0.0,
     doubt=0.0,
     bad_ns=0,
@@ -317,7 +330,9 @@ def _judged(check: OdometryCheck, after: WayEntry, noise: OwnNoise, trust: Input
     tells = _square(track.v, variance.v) + _square(track.u, variance.u) > _SMALL
     if not check.by_twist.trusted:
         # Of a scale of 1.3, say, a robot that creeps tells nothing.
-        off_v, off_u = _off_by(check.v) * track.v, _off_by(check.u) * track.u
+        v, u = check.v.misfit > _SMALL, check.u.misfit > _SMALL
+        off_v = _off_by(check.v) * track.v if v or not u else 0.0
+        off_u = _off_by(check.u) * track.u if u or not v else 0.0
         tells = _square(off_v, variance.v) + _square(off_u, variance.u) > _SMALL
     by_twist = _with_window(check.by_twist, misfit_v + misfit_u, tells)
     by_pose = check.by_pose
@@ -326,19 +341,20 @@ def _judged(check: OdometryCheck, after: WayEntry, noise: OwnNoise, trust: Input
         by_pose = _with_window(by_pose, off, tells)
     check = check._replace(by_twist=by_twist, by_pose=by_pose)
     if by_twist.trusted and by_twist.excess == 0.0:
-        return check._replace(v=Sums(0.0, 0.0, 0.0, 0.0), u=Sums(0.0, 0.0, 0.0, 0.0))
-    if by_twist.borne_out > 0:
-        return check
+        return check._replace(v=no_sums(), u=no_sums())
     return check._replace(
-        v=_with_products(check.v, told.v, track.v, misfit_v),
-        u=_with_products(check.u, told.u, track.u, misfit_u),
+        v=_with_products(check.v, told.v, track.v, abs(track.u), misfit_v),
+        u=_with_products(check.u, told.u, track.u, abs(track.u), misfit_u),
     )
 
 
 @kernel
 def _off_by(sums: Sums) -> float:
-    """By how much of the true motion a refuted channel is off."""
-    return sums.both / sums.shown - 1.0 if sums.shown > 0.0 else 0.0
+    """By how much of the true motion a refuted channel is off: its scale, or all of it if it is none."""
+    if sums.both * sums.both < _ALIKE * sums.told * sums.shown or sums.shown <= 0.0:
+        return -1.0
+    off = sums.both / sums.shown - 1.0
+    return off if abs(off) > 2.0 * SCALE else -1.0
 
 
 @kernel
@@ -346,19 +362,32 @@ def _with_window(source: SourceCheck, misfit: float, tells: bool) -> SourceCheck
     """Source after one more window, which speaks for it only if it ``tells`` it from a wrong one."""
     excess = max(0.0, source.excess + min(misfit, _LARGE) - _SMALL)
     if misfit > _SMALL:
-        return SourceCheck(min(excess, 2.0 * _REFUTED), 0, source.trusted and excess <= _REFUTED)
-    borne_out = source.borne_out + 1 if tells else source.borne_out
-    trusted = source.trusted or borne_out >= _BORNE_OUT
+        trusted = source.trusted and excess <= _REFUTED
+        refuted_now = source.trusted and not trusted
+        needs = min(2 * source.needs, _MOST_NEEDED) if refuted_now else source.needs
+        return SourceCheck(min(excess, 2.0 * _REFUTED), 0, needs, trusted)
+    borne_out = min(source.borne_out + 1, _MOST_NEEDED) if tells else source.borne_out
+    trusted = source.trusted or borne_out >= source.needs
     if trusted and not source.trusted:
         excess = 0.0
-    return SourceCheck(excess, min(borne_out, _BORNE_OUT), trusted)
+    return SourceCheck(excess, borne_out, source.needs, trusted)
 
 
 @kernel
-def _with_products(sums: Sums, told: float, shown: float, misfit: float) -> Sums:
+def no_sums() -> Sums:
+    """Sums of nothing."""
+    return Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def _with_products(sums: Sums, told: float, shown: float, turns: float, misfit: float) -> Sums:
+    slip = shown * turns
     return Sums(
         _FORGETS * sums.told + told * told,
         _FORGETS * sums.both + told * shown,
         _FORGETS * sums.shown + shown * shown,
+        _FORGETS * sums.slipped + told * slip,
+        _FORGETS * sums.by_slip + shown * slip,
+        _FORGETS * sums.slip + slip * slip,
         _FORGETS * sums.misfit + misfit,
     )

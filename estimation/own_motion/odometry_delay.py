@@ -24,6 +24,7 @@ _STEPS = round(REACH / _GRID)
 _SPAN = 3.0  # [s] of windows
 _FEWEST = 4  # windows
 _CLEAR = 27.63  # of the sum of squares; the chi-square quantile of 0.9999999 with one degree of freedom or so
+_FITS = 9.21  # mean misfit of a window that is left at most, the chi-square quantile of 0.99
 _SHARE = 0.25  # of the misfit that may be left by a delay that explains it
 _SCALE = 0.02
 _LEVER = 0.01
@@ -103,7 +104,7 @@ def _misfit_at(
 def delay_of(entries: Rows[WayEntry], ring: Ring, paired: int, noise: OwnNoise, trust: InputTrust) -> float:
     """How much later [s] than the motion odometry is, negative if earlier; 0 if that is not clear.
 
-    A delay explains the misfits if it leaves less than a quarter of them.
+    A delay explains the misfits if it leaves less than a quarter of them, and they fit then.
     """
     if paired < 2:
         return 0.0
@@ -116,5 +117,5 @@ def delay_of(entries: Rows[WayEntry], ring: Ring, paired: int, noise: OwnNoise, 
         if total < least:
             best, least = k, total
     delay = best * _GRID
-    clear = at_once - least > _CLEAR and least < _SHARE * at_once
+    clear = at_once - least > _CLEAR and least < _SHARE * at_once and least < _FITS * count
     return delay if clear and abs(delay) > LEAST - 0.5 * _GRID else 0.0

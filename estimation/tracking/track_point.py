@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 from estimation.filters.filter import Filter
 from estimation.filters.gaussian import Gaussian
-from estimation.models.coordinated_turn import FollowerMotion, mean_motion
-from estimation.models.measurement import Measurement, way_between
+from estimation.models.coordinated_turn import FollowerMotion, ProcessNoise, mean_motion
+from estimation.models.measurement import NO_MOTION, Measurement, way_between
 from estimation.tracking.follower_check import BELIEVED, FollowerCheck, check_from
 from estimation.tracking.follower_check import GATED as LEADER_OFF
+from estimation.tracking.manoeuvre import Manoeuvre, steady
 from formation.kernel import kernel
 from formation.pose import Pose
 
@@ -74,7 +75,9 @@ class TrackPoint(NamedTuple):
 
     verdict: a :class:`Verdict`; cause: why the measurement was not used, a
     :class:`~estimation.tracking.follower_check.Cause`. used_ns: capture time of the newest one that was used.
+    noise: what the leader was taken to be driven by. manoeuvre: what innovations tell of jumps of its motion.
     period: typical time [s] from one measurement to the next, 0 while there was but one.
+    way, way_s: the follower's mean motion that the belief was moved by, and for how long [s].
     """
 
     measurement: Measurement
@@ -87,7 +90,11 @@ class TrackPoint(NamedTuple):
     check: FollowerCheck
     cause: int
     jump: JumpUncertainty
+    noise: ProcessNoise
+    manoeuvre: Manoeuvre
     period: float = 0.0
+    way: FollowerMotion = NO_MOTION
+    way_s: float = 0.0
 
 
 @kernel
@@ -111,6 +118,10 @@ def begun(measurement: Measurement, estimator: Filter) -> TrackPoint:
         check_from(measurement),
         BELIEVED,
         JumpUncertainty(0.0, 0.0, 0),
+        estimator.noise,
+        steady(),
+        0.0,
+        FollowerMotion(0.0, 0.0, 0.0, 0.0),
         0.0,
     )
 

@@ -27,6 +27,7 @@ from estimation.tracking.follower_check import (
     checked,
 )
 from estimation.tracking.follower_check import GATED as LEADER_OFF
+from estimation.tracking.leader_step import followed_leader
 from estimation.tracking.reacquisition import joined, jumped, line_turn
 from estimation.tracking.track_point import (
     DUPLICATE,
@@ -82,6 +83,7 @@ class TrackSettings(NamedTuple):
     settles, and above which it no longer counts as settled.
     capped_speed: whether a leader that seems faster than k_v settles as one of k_v would.
     followed_turn: how far [rad] a jump may turn alpha1 and alpha2 for the track to follow it.
+    notices_manoeuvres: whether a run of innovations raises the process noise.
     """
 
     gate_probability: float = 0.9999
@@ -94,6 +96,7 @@ class TrackSettings(NamedTuple):
     unsettled_heading: float = 0.6
     capped_speed: bool = True
     followed_turn: float = 0.25
+    notices_manoeuvres: bool = False
 
 
 class Added(NamedTuple):
@@ -163,8 +166,9 @@ def follow(
     # Nothing passes a negative gate: the belief is then the prediction.
     gate = full_gate if found.cause == BELIEVED else -1.0
     dt = (capture_ns - last.measurement.capture_ns) * _NS
-    motion = way_to(last, measurement, found.cause == BELIEVED, dt)
-    stepped = estimator.step(last.belief, dt, motion, measurement, gate)
+    way = way_to(last, measurement, found.cause == BELIEVED, dt)
+    followed = followed_leader(last, measurement, way, gate, settings.notices_manoeuvres, estimator)
+    stepped = followed.stepped
     point = TrackPoint(
         measurement,
         stepped.belief,
@@ -176,7 +180,11 @@ def follow(
         found.check,
         BELIEVED,
         _lasting(last.jump, capture_ns, settings),
+        estimator.noise,
+        followed.manoeuvre,
         next_period(last.period, dt),
+        way,
+        dt,
     )
     if stepped.nis <= gate:
         return point
@@ -340,7 +348,7 @@ def _inserted(
     for at in range(n, k, -1):
         store(points, place(ring, points, at), point_at(points, ring, at - 1))
     here = point_at(points, ring, k)
-    store(points, place(ring, points, k), here._replace(measurement=measurement))
+    store(points, place(ring, points, k), here._replace(measurement=measurement, noise=estimator.noise))
     ring = Ring(ring.first, n + 1)
     reprocessed(points, ring, k, settings, estimator)
     here = point_at(points, ring, k)
@@ -376,7 +384,9 @@ def reprocessed(
     first = max(k, 1)
     point = point_at(points, ring, first - 1)
     for at in range(first, ring.length):
-        point = follow(point, point_at(points, ring, at).measurement, settings, estimator)
+        # By the noise that it had: what has been learned since is not for it.
+        old = point_at(points, ring, at)
+        point = follow(point, old.measurement, settings, estimator.driven_by(old.noise))
         store(points, place(ring, points, at), point)
     return ring.length - first
 

@@ -92,6 +92,7 @@ def _run_data(log: Log, played: Played) -> RunData:
         certified=played.certified,
         taken=played.estimator.taken,
         refused=played.estimator.refused,
+        noise_scale=played.estimator.noise_scale,
         found=found_again(found.found, played.found, link, same=bool(played.parity)),
     )
 

@@ -21,6 +21,7 @@ from hil.judge.estimation import judge_estimation
 from hil.judge.findings import findings_list
 from hil.judge.formation import judge_formation
 from hil.judge.made_by import law_json
+from hil.judge.noise import certain, judge_noise, supported
 from hil.judge.published_bounds import judge_published
 from hil.judge.run_data import RunData
 from hil.log.report_json import known
@@ -42,11 +43,13 @@ def summarise(run_data: RunData) -> dict[str, Any]:
     ``law``: a name, of one's own more (:func:`hil.judge.made_by.law_json`).
     ``findings``: what nodes found to be wrong, and the judge (:mod:`hil.judge.findings`); absent where nobody
     could have told. ``orders_refused``: why the scenario's own orders to change sides were, if they were.
-    ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it.
+    ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it, and ``certified`` hold
+    no figures where ``noise`` says that the noise exceeds what they rest on.
     """
     columns = columns_of(run_data)
     given = run_data.scenario
     driven = run_data.motion_since_ns is not None
+    scale = run_data.noise_scale
     estimation = judge_estimation(run_data, columns)
     summary = {
         "scenario": given.name,
@@ -60,8 +63,11 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "bounds": judge_bounds(given, columns)
         | judge_assumptions(given, columns)
         | judge_published(given, columns),
-        "certified": judge_certified(run_data.certified, columns.truth, columns.span),
-        "certificate": run_data.certificate or certificate_json(certificate_of(given, driven=driven)),
+        "noise": judge_noise(scale),
+        "certified": certain(judge_certified(run_data.certified, columns.truth, columns.span), scale),
+        "certificate": supported(
+            run_data.certificate or certificate_json(certificate_of(given, driven=driven)), scale
+        ),
         "formation": judge_formation(run_data, columns),
         "latency_ms": _latency(columns),
         "clock": judge_clock(arrival_rows(run_data)),

@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from hil.judge.made_by import law_failure, made_by
+from hil.judge.noise import noise_warnings
 from hil.nodes.findings import finding_line
 
 GOOD, BAD, PLAIN = "green", "bold red", ""
@@ -45,6 +46,7 @@ def warnings_of(summary: Mapping[str, Any]) -> list[str]:
     """What deserves a second look, in plain words."""
     return [
         *_estimation_warnings(summary),
+        *noise_warnings(summary),
         *_assumption_warnings(summary),
         *_certified_warnings(summary),
         *_formation_warnings(summary),

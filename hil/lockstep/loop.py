@@ -19,7 +19,7 @@ from formation.kernel import kernel
 from formation.pose import Motion
 from formation.records import load, size, store
 from hil.emulator.mocap import SeenPose
-from hil.emulator.robot import Robot, pose_of
+from hil.emulator.robot import Robot, pose_of, travelling
 from hil.emulator.world import (
     CAPTURE,
     FRAME,
@@ -146,9 +146,8 @@ def _captured(flight: Flight, plan: Plan, rooms: Rooms, happened: Happened, arri
     world, n = flight.world, size(rooms.clocks)
     for k in range(n):
         ahead, behind = load(Robot, rooms.lab.robots, k), load(Robot, rooms.lab.robots, k + 1)
-        true = TrueFrame(
-            happened.at_ns, arrives, pose_of(ahead), pose_of(behind), ahead.motion, behind.motion
-        )
+        led = travelling(ahead)
+        true = TrueFrame(happened.at_ns, arrives, led.pose, pose_of(behind), led.motion, behind.motion)
         store(rooms.truth, happened.number * n + k, true)
     flight = flight._replace(captures=happened.number + 1)
     if world.motion_since_ns < 0:

@@ -24,6 +24,7 @@ from hil.nodes.estimator_step import AUTO, MOCAP, Known, is_under_way
 from hil.nodes.findings import Findings, named_findings
 from hil.nodes.frame_time import clock_report
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
+from hil.nodes.noise_report import noise_findings, noise_report, scale_of
 from hil.nodes.odometry_findings import odometry_findings
 from hil.nodes.sensor_offsets import offsets_report
 from hil.scenario.files import refuse_unrunnable
@@ -82,6 +83,11 @@ class EstimatorState:
     def refused(self) -> Counts:
         """Inputs that were not used, by cause."""
         return self.memory.refused
+
+    @property
+    def noise_scale(self) -> float | None:
+        """Noise of positions as it is found over what is told, None where it is given."""
+        return scale_of(self.memory.known.noise, self.memory.rules.step.noise_learning)
 
 
 class EstimatorNode:
@@ -221,6 +227,7 @@ class EstimatorNode:
             if self.scenario.estimator.bias_states and known.track.length
             else {}
         )
+        values |= noise_report(known.noise, self.rules.step.noise_learning)
         if self.aligns:
             applied = state.comparison.applied._asdict()
             values |= {f"odometry.{name}": value for name, value in applied.items()}
@@ -233,7 +240,9 @@ class EstimatorNode:
 
         A replay in one pass asks too, and has loaded none of the node's own steps.
         """
-        return odometry_findings(state.memory.known, self.rules.step, now_ns)
+        known, rules = state.memory.known, self.rules.step
+        noise = noise_findings(known.noise, rules.noise_learning)
+        return odometry_findings(known, rules, now_ns) | noise
 
     def _missing(self, known: Known) -> str:
         """What the estimator waits for to begin."""

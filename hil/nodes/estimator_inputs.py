@@ -196,10 +196,10 @@ def _take_sighting(desk: Desk, known: Known, rules: Rules) -> Taken:
         motion = step.by_either_at(known, memory, rules, seen.capture_ns)
     else:
         motion = step.by_odometry(known, memory, rules, seen.capture_ns)
-    measurement = measure_body(
-        seen.capture_ns, seen.rho, seen.alpha2, sensor.sigma_range, sensor.sigma_bearing, motion
-    )
-    return step.take(known, memory, rules, measurement)
+    scale = known.noise.scale
+    sd_range, sd_bearing = scale.range * sensor.sigma_range, scale.bearing * sensor.sigma_bearing
+    measurement = measure_body(seen.capture_ns, seen.rho, seen.alpha2, sd_range, sd_bearing, motion)
+    return step.with_sight_noise(step.take(known, memory, rules, measurement), memory, rules)
 
 
 @kernel

@@ -8,6 +8,23 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from estimation.consistency.noise_estimate import (
+    NOISE_GIVEN,
+    Moment,
+    NoiseEstimate,
+    NoiseLearning,
+    noise_with_frame,
+    noise_with_sighting,
+    scaled_noise,
+)
+from estimation.consistency.process_estimate import (
+    LearnedProcess,
+    Member,
+    ProcessLearning,
+    learn,
+    learned_noise,
+    restarted,
+)
 from estimation.filters.filter import Filter
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import (
@@ -19,7 +36,7 @@ from estimation.models.measurement import (
     measure_world,
 )
 from estimation.own_motion.interval_motion import motion_between
-from estimation.own_motion.judged_odometry import FRESH, age_of, aged, is_better, with_own_track
+from estimation.own_motion.judged_odometry import age_of, aged, fresh_for, is_better, with_own_track
 from estimation.own_motion.odometry_check import (
     POSE,
     TRACK,
@@ -57,7 +74,7 @@ from estimation.tracking.estimate import Estimate, estimate_at
 from estimation.tracking.follower_check import BELIEVED
 from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
 from estimation.tracking.follower_check import GATED as LEADER_OFF
-from estimation.tracking.track_point import DUPLICATE, GATED, LATE, TrackPoint
+from estimation.tracking.track_point import DUPLICATE, GATED, LATE, RESTARTED, USED, TrackPoint
 from estimation.tracking.tracker import (
     TrackSettings,
     add,
@@ -85,7 +102,7 @@ class Rules(NamedTuple):
 
     source: where the follower's motion is from. reprocesses: whether odometry that comes late is folded in
     again. span: seconds of odometry kept. noise: of a mocap pose. mount: of the follower's
-    body.
+    body. noise_learning: by what the noise is put right.
     """
 
     settings: TrackSettings
@@ -96,25 +113,30 @@ class Rules(NamedTuple):
     noise: PoseNoise
     trust: InputTrust
     own_noise: OwnNoise
+    process_learning: ProcessLearning
     mount: Mount = NO_MOUNT
+    noise_learning: NoiseLearning = NOISE_GIVEN
 
 
 class Memory(NamedTuple):
-    """Rows that an estimator works in: the leader's track, odometry, the follower's own track, and the ways.
+    """Rows that an estimator works in: the leader's track, odometry, the follower's own track, and more.
 
-    By the ``ways`` that both have gone odometry is judged.
+    By the ``ways`` that both have gone odometry is judged. ``bank``: filters of other process noise, by which
+    that is found.
     """
 
     points: Rows[TrackPoint]
     history: Rows[MotionSample]
     own: Rows[OwnPoint]
     ways: Rows[WayEntry]
+    bank: Rows[Member]
 
 
 class Known(NamedTuple):
     """Where the rows are filled, by what odometry is corrected, and how far it is believed.
 
-    ``watched_ns``: capture of the first frame since when odometry is missed, 0 before.
+    ``watched_ns``: capture of the first frame since when odometry is missed, 0 before. ``noise``: of
+    measurements, as they tell it. ``process``: what is known of how the leader drives.
     """
 
     track: Ring
@@ -123,6 +145,8 @@ class Known(NamedTuple):
     correction: Correction
     odometry_check: OdometryCheck
     watched_ns: int
+    noise: NoiseEstimate
+    process: LearnedProcess
 
 
 class Taken(NamedTuple):
@@ -177,20 +201,26 @@ def by_pose(before: OdometrySample, after: OdometrySample) -> MotionSample:
 
 
 @kernel
+def _trust(known: Known, rules: Rules) -> InputTrust:
+    """What is known of odometry, its delay as it is corrected."""
+    return rules.trust._replace(delay=rules.trust.delay + known.correction.delay)
+
+
+@kernel
 def _fresh_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
     """Motion by odometry that is believed, as old as it is; by nothing at all if there is none to believe."""
     motion, check = by_odometry(known, memory, rules, capture_ns), known.odometry_check
     if source_of(check) == TRACK or not check.heard:
         return motion._replace(sd_v2=rules.own_noise.v_max, sd_u2=rules.own_noise.u_max)
-    return aged(motion, check, age_of(check, capture_ns, rules.trust), rules.own_noise)
+    return aged(motion, check, age_of(check, capture_ns, _trust(known, rules)), rules.own_noise)
 
 
 @kernel
 def _is_fresh(known: Known, rules: Rules, capture_ns: int) -> bool:
     """Whether odometry is believed and covers a capture."""
     check = known.odometry_check
-    age = age_of(check, capture_ns, rules.trust)
-    return check.heard and source_of(check) != TRACK and age <= FRESH * check.period
+    age = age_of(check, capture_ns, _trust(known, rules))
+    return check.heard and source_of(check) != TRACK and age <= fresh_for(check)
 
 
 @kernel
@@ -223,7 +253,7 @@ def _judged(known: Known, memory: Memory, rules: Rules) -> OdometryCheck:
     check = known.odometry_check
     if not awaits_track(check):
         return check
-    return with_own_track(check, memory.ways, memory.own, known.own, rules.own_noise, rules.trust)
+    return with_own_track(check, memory.ways, memory.own, known.own, rules.own_noise, _trust(known, rules))
 
 
 @kernel
@@ -234,7 +264,39 @@ def take_not_finite(known: Known, now_ns: int) -> Known:
 
 @kernel
 def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
-    """Take in a mocap frame that was captured at a time by the host's clock."""
+    """Take in a mocap frame that was captured at a time by the host's clock.
+
+    It is taken with the noise as known from the frames before, and keeps that if it is folded again.
+    """
+    if not rules.noise_learning.learns:
+        return _take_frame(known, memory, rules, capture_ns, seen)
+    noise = scaled_noise(rules.noise, known.noise)
+    taken = _take_frame(known, memory, with_noise(rules, noise), capture_ns, seen)
+    if taken.late or taken.verdict == DUPLICATE or taken.verdict == LATE:
+        return taken
+    gated = taken.cause != BELIEVED
+    learned = noise_with_frame(known.noise, Moment(capture_ns, seen), gated, rules.noise_learning)
+    return taken._replace(known=taken.known._replace(noise=learned))
+
+
+@kernel
+def with_sight_noise(taken: Taken, memory: Memory, rules: Rules) -> Taken:
+    """The same with what a sighting that came in order tells of the sensor's noise."""
+    unused = taken.verdict == DUPLICATE or taken.verdict == LATE
+    if not rules.noise_learning.learns or taken.late or unused:
+        return taken
+    learned = noise_with_sighting(taken.known.noise, newest(memory.points, taken.known.track))
+    return taken._replace(known=taken.known._replace(noise=learned))
+
+
+@kernel
+def with_noise(rules: Rules, noise: PoseNoise) -> Rules:
+    """Rules by which poses have this noise."""
+    return rules._replace(noise=noise, own_noise=rules.own_noise._replace(pose=noise))
+
+
+@kernel
+def _take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
     if rules.source == ODOMETRY:
         motion = by_odometry(known, memory, rules, capture_ns)
         return take(known, memory, rules, measured(rules, capture_ns, seen, motion))
@@ -298,17 +360,38 @@ def take(known: Known, memory: Memory, rules: Rules, measurement: Measurement) -
     late = ring.length > 0 and measurement.capture_ns < capture_at(points, ring, ring.length - 1)
     before = place_of(points, ring, measurement.capture_ns)
     measurement = _with_way(known, memory, rules, measurement, before)
-    added = add(points, ring, measurement, rules.settings, rules.filter)
-    known = known._replace(track=added.ring)
+    learning, estimator = rules.process_learning, rules.filter
+    if learning.on:
+        estimator = estimator.driven_by(learned_noise(known.process, learning))
+    added = add(points, ring, measurement, rules.settings, estimator)
     cause = added.cause if added.verdict == GATED else BELIEVED
+    known = known._replace(track=added.ring)
     if late and measurement.has_way and added.verdict != DUPLICATE and added.verdict != LATE:
-        # What comes after it has a shorter way now.
-        k = place_of(points, added.ring, measurement.capture_ns) + 1
-        after = point_at(points, added.ring, k).measurement
-        shorter = _with_way(known, memory, rules, after, k)
-        if _put_measurement(known, memory, k, shorter):
-            reprocessed(points, added.ring, k, rules.settings, rules.filter)
+        _shorten_way(known, memory, rules, measurement.capture_ns)
+    if learning.on and not late:
+        known = known._replace(process=_learned(known, memory, rules, added.verdict))
     return Taken(known, added.verdict, cause, late)
+
+
+@kernel
+def _shorten_way(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> None:
+    """Give what comes after a measurement that came late its way since that one."""
+    points, ring = memory.points, known.track
+    k = place_of(points, ring, capture_ns) + 1
+    after = _with_way(known, memory, rules, point_at(points, ring, k).measurement, k)
+    if _put_measurement(known, memory, k, after):
+        reprocessed(points, ring, k, rules.settings, rules.filter)
+
+
+@kernel
+def _learned(known: Known, memory: Memory, rules: Rules, verdict: int) -> LearnedProcess:
+    """What is known of the leader's driving with the newest point of its track in it."""
+    if verdict == RESTARTED:
+        return restarted(known.process)
+    if verdict != USED:
+        return known.process
+    point = newest(memory.points, known.track)
+    return learn(known.process, memory.bank, point, rules.process_learning, rules.filter)
 
 
 @kernel
@@ -319,6 +402,8 @@ def take_odometry(known: Known, memory: Memory, rules: Rules, told: OdometrySamp
         check = known.odometry_check
         if source_of(check) == POSE and told.has_pose and check.last.has_pose:
             sample = by_pose(check.last, told)
+        by = known.correction
+        told = told._replace(v2=by.scale_v * told.v2, u2=by.scale_u * told.u2)
         check = with_sample(check, memory.ways, told, rules.own_noise)
         known = known._replace(odometry_check=check)
         if known.own.length > 0:

@@ -13,8 +13,9 @@ _SILENT_S = 0.5  # the least; five periods of slower odometry
 _PERIODS = 5.0
 _NONE_YET_S = 1.0
 _LATELY_S = 1.0
-_REMEMBERED_S = 10.0  # for how long a reset is told
+_REMEMBERED_S = 60.0  # for how long a reset is told
 _NOTHING = 0.1  # share of the true motion below which a channel tells none
+_NEAR_ONE, _EXPLAINS = 0.2, 0.3
 _ALIKE = 0.9  # correlation above which a channel tells the motion by another scale
 _OFF = 9.21  # misfit of a channel that contradicts, the chi-square quantile that a window must exceed
 
@@ -35,7 +36,7 @@ def odometry_findings(known: Known, rules: Rules, now_ns: int) -> dict[str, str]
         return found
     if age > max(_SILENT_S, _PERIODS * check.period):
         if not found:
-            found["odometry_silent"] = f"newest odometry is {age:.1f} s old{_rate(check)}{_instead(known)}"
+            found["odometry_silent"] = f"newest odometry is {age:.1f} s old{_rate(check)}{_in_silence(known)}"
         return found
     if check.late != 0.0:
         way = "late" if check.late > 0.0 else "ahead of the motion, as commands are,"
@@ -61,10 +62,34 @@ def _instead(known: Known) -> str:
     return "; the mocap track is taken instead" if source == TRACK else ""
 
 
+def _in_silence(known: Known) -> str:
+    if known.own.length == 0:
+        return "; there is no mocap track to take instead, and its deviation grows"
+    return "; the mocap track is taken instead"
+
+
 def _contradiction(check: OdometryCheck) -> str:
     """What a refuted twist tells, channel by channel."""
+    slip = _slip(check.u)
+    if slip > 0.0:
+        return f"what slips away by {slip:.2f} of the motion for every rad/s of turning"
     parts = [_off("speed", check.v), _off("turn rate", check.u)]
     return " and ".join(part for part in parts if part) or "another motion than the mocap track"
+
+
+def _slip(sums: Sums) -> float:
+    """Share of the turn that is told too much per rad/s, where that explains it; 0 where it does not.
+
+    ``told = (a + b |u|) u`` by least squares, with a near 1, against ``told = a u``.
+    """
+    determinant = sums.shown * sums.slip - sums.by_slip * sums.by_slip
+    if sums.misfit < _OFF or determinant <= 1e-6 * sums.shown * sums.slip:
+        return 0.0
+    a = (sums.both * sums.slip - sums.slipped * sums.by_slip) / determinant
+    b = (sums.slipped * sums.shown - sums.both * sums.by_slip) / determinant
+    scaled = sums.told - sums.both * sums.both / sums.shown
+    left = sums.told - a * sums.both - b * sums.slipped
+    return b if b > 0.0 and abs(a - 1.0) < _NEAR_ONE and left < _EXPLAINS * scaled else 0.0
 
 
 def _off(channel: str, sums: Sums) -> str:

@@ -103,7 +103,9 @@ def _sightings(folder: Path, leader: int, follower: int) -> Series:
     """
     codes = {subject: round(code) for subject, code in _numbers(folder / "Barcodes.dat", 2)}
     if leader not in codes:
-        raise UsageError(f"{folder / 'Barcodes.dat'}: has no subject {leader}; expected a bar code of robot {leader}")
+        raise UsageError(
+            f"{folder / 'Barcodes.dat'}: has no subject {leader}; expected a bar code of robot {leader}"
+        )
     path = folder / f"Robot{follower}_Measurement.dat"
     rows = [row for row in _numbers(path, 4) if round(row[1]) == codes[leader]]
     stamps: dict[int, list[float]] = {

@@ -36,7 +36,9 @@ Stamped = tuple[int, int, str, msg.Message]
 """Stamp [ns], rank among messages of that stamp, topic, message."""
 
 
-def import_mrclam(folder: Path, leader: int, follower: int, out: Path, sightings: Sightings = "vicon") -> Imported:
+def import_mrclam(
+    folder: Path, leader: int, follower: int, out: Path, sightings: Sightings = "vicon"
+) -> Imported:
     """Write what is known of two robots and the follower's odometry to the new log ``out``.
 
     ``sightings`` vicon: the tracks. Every pose of the follower makes a frame, the leader's pose interpolated to its time and left out where it

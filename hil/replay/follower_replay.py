@@ -230,8 +230,15 @@ class FollowerReplay:
         )
         state = self.nodes.estimating
         if not self.same:
-            missing, again = estimating.missing, self._found
-            return KeptReplay(self.link, kept, state.taken, state.refused, {}, missing, found=again)
+            return KeptReplay(
+                self.link,
+                kept,
+                state.taken,
+                state.refused,
+                missing_inputs=estimating.missing,
+                noise_scale=state.noise_scale,
+                found=self._found,
+            )
         return KeptReplay(
             self.link,
             kept,
@@ -243,6 +250,7 @@ class FollowerReplay:
             },
             missing_inputs=estimating.missing + deciding.missing,
             restarts=self.restarts,
+            noise_scale=state.noise_scale,
             found=self._found,
         )
 

@@ -44,8 +44,9 @@ class Kept:
 class KeptReplay:
     """A replay of one follower, as :class:`hil.replay.rerun.Replay` is, with rows in the place of messages.
 
-    ``taken``, ``refused``: the estimator's counts. ``found``: findings of the nodes that were replayed, by
-    their names, as seen now and then. ``fed`` is empty, since who is fed is replayed otherwise.
+    ``taken``, ``refused``, ``noise_scale``: the estimator's counts, and the noise that it found. ``found``:
+    findings of the nodes that were replayed, by their names, as seen now and then. ``fed`` is empty, since
+    who is fed is replayed otherwise.
     """
 
     link: Link
@@ -56,6 +57,7 @@ class KeptReplay:
     missing_inputs: int = 0
     restarts: Mapping[str, int] = field(default_factory=dict)
     fed: str = ""
+    noise_scale: float | None = None
     found: Mapping[str, Findings] = field(default_factory=dict)
 
     @property

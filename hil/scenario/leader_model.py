@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from estimation.consistency.noise_estimate import NoiseLearning
+from estimation.consistency.process_estimate import ProcessLearning
 from estimation.filters.belief import Model
 from estimation.filters.estimator import Estimator
 from estimation.filters.estimators import make_estimator, settling
@@ -29,6 +31,19 @@ def process_noise(scenario: Scenario) -> ProcessNoise:
     """Noise of the leader's motion, by rule."""
     given = scenario.estimator
     return ProcessNoise.by_rule(leader_limits(scenario), given.turn_bandwidth, given.speed_bandwidth)
+
+
+def finds_process_noise(scenario: Scenario) -> bool:
+    """Whether process noise is found by what is seen: only the filters that are records take another one."""
+    given = scenario.estimator
+    return given.process_noise == "estimated" and given.kind in ("ekf", "ukf") and not given.bias_states
+
+
+def process_learning(scenario: Scenario) -> ProcessLearning:
+    """How the leader's process noise is found, if it is."""
+    limits = leader_limits(scenario)
+    speed, turn = limits.k_v * limits.k_v, limits.k_u * limits.k_u
+    return ProcessLearning(finds_process_noise(scenario), process_noise(scenario), speed, turn)
 
 
 def leader_model(scenario: Scenario) -> Model:
@@ -111,6 +126,7 @@ def track_settings(scenario: Scenario) -> TrackSettings:
         coast_after=float(given.coast_after_s),
         lost_after=float(given.lost_after_s),
         window=float(given.window_s),
+        notices_manoeuvres=finds_process_noise(scenario),
         **settled._asdict(),
     )
 
@@ -118,6 +134,14 @@ def track_settings(scenario: Scenario) -> TrackSettings:
 def pose_noise(scenario: Scenario) -> PoseNoise:
     """Noise of a mocap pose, as the estimator is told."""
     return PoseNoise(float(scenario.estimator.sigma_position), float(scenario.estimator.sigma_heading))
+
+
+def noise_learning(scenario: Scenario) -> NoiseLearning:
+    """Whether the noise of poses is put right by what frames tell of it."""
+    given, told = scenario.estimator, pose_noise(scenario)
+    # The literal way to compare with takes all as it is told.
+    learns = given.noise == "estimated" and given.kind != "difference"
+    return NoiseLearning(learns, told, float(scenario.leader.v_eps))
 
 
 def own_noise(scenario: Scenario) -> OwnNoise:
