@@ -71,9 +71,8 @@ class LearnedProcess(NamedTuple):
     speed, turn: ratios of q_v and q_u to what is told. settled_ns: since when the track is settled, 0 if it
     is not. begun: whether the bank runs. at_ns: time of its beliefs. ended_ns: capture of the last measurement
     in them; motion: of the follower then. count, later_ns, x, y: number of measurements put together since,
-    the sum of their times after ``ended_ns``, and sums of positions. way_s, way: time [s]
-    since ``ended_ns`` over which the follower's way is known, and the sums of its motion over that, its
-    variances times time.
+    the sum of their times after ``ended_ns``, and sums of positions. way_s, way: time [s] since ``ended_ns``
+    over which the follower's way is known, and sums over it of its motion, and of its variances, times time.
     """
 
     speed: float

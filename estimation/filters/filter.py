@@ -85,7 +85,7 @@ class Filter(NamedTuple):
         """Belief after dt [s], the follower having moved as given."""
         ahead = unscented_carried(belief, dt) if self.kind == UKF else extended_carried(belief, dt)
         noise = self.noise if self.in_world else standing_noise(belief, self.noise)
-        if self.lever.is_none():
+        if self.lever.is_centred():
             ahead = driven(ahead, mean_of(belief), dt, noise)
         else:
             ahead = self._driven_by_body(ahead, belief, dt, noise)
@@ -116,7 +116,7 @@ class Filter(NamedTuple):
 
     @kernel
     def _shows_body(self, measurement: Measurement) -> bool:
-        return measurement.framed and not self.lever.is_none()
+        return measurement.framed and not self.lever.is_centred()
 
     @kernel(inline=False)
     def _informed_by_body(self, belief: Gaussian, measurement: Measurement) -> Gaussian:

@@ -22,7 +22,7 @@ class Lever(NamedTuple):
     y: float
 
     @kernel
-    def is_none(self) -> bool:
+    def is_centred(self) -> bool:
         """Whether the body sits above the middle of the wheel axis."""
         return self.x == 0.0 and self.y == 0.0
 

@@ -19,7 +19,6 @@ from formation.arc import small_turn
 from formation.kernel import kernel
 from formation.pose import Pose
 
-
 NO_MOTION = FollowerMotion(0.0, 0.0, 0.0, 0.0)
 
 

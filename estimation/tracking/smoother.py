@@ -13,10 +13,10 @@ import numpy as np
 from estimation.filters.gaussian import Gaussian
 from estimation.models.measurement import Measurement
 from estimation.models.motion import STATE_SIZE
-from estimation.tracking.track import Tracker
 from estimation.tracking.follower_check import BELIEVED
 from estimation.tracking.follower_check import GATED as LEADER_OFF
-from estimation.tracking.track_point import TrackPoint, Verdict, no_tentative
+from estimation.tracking.track import Tracker
+from estimation.tracking.track_point import TrackPoint, Verdict, no_tentative, way_to
 
 _NS = 1e-9
 
