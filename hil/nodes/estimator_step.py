@@ -346,9 +346,9 @@ def _with_way(known: Known, memory: Memory, rules: Rules, measurement: Measureme
     if rules.filter.in_world or measurement.anchored or k == 0 or known.odometry.length == 0:
         return measurement
     to_ns = measurement.capture_ns
-    if measurement.framed and rules.source != ODOMETRY:
-        if rules.source != AUTO or not _is_fresh(known, rules, to_ns):
-            return measurement._replace(has_way=False)
+    by_sample = rules.source == ODOMETRY or not measurement.framed
+    if not by_sample and (rules.source != AUTO or not _is_fresh(known, rules, to_ns)):
+        return measurement._replace(has_way=False)
     from_ns = capture_at(memory.points, known.track, k - 1)
     if from_ns >= to_ns:
         return measurement
