@@ -8,6 +8,7 @@ import numpy as np
 
 from formation.angles import FloatArray
 from formation.leader import encoded
+from formation.mount import Mount
 from formation.pose import Motion, Pose
 from formation.records import Rows, columns_of, load, row_of, rows_of, store
 from formation.ring import EMPTY, place
@@ -66,6 +67,8 @@ def lab_of(scenario: Scenario) -> Lab:
         ),
         mocap.rate_hz,
         robot.odometry_rate_hz,
+        Mount(*map(float, mocap.leader_mount)),
+        Mount(*map(float, mocap.follower_mount)),
     )
 
 

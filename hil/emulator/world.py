@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from formation.kernel import kernel
 from formation.leader import Program, TableRow, driven
+from formation.mount import Mount
 from formation.pose import STANDSTILL, Motion, Pose
 from formation.records import Rows, load, size, store
 from formation.ring import Ring, place, without_oldest
@@ -64,7 +65,7 @@ class OdometryError(NamedTuple):
 
 
 class Lab(NamedTuple):
-    """All that is fixed. Rates are in Hz."""
+    """All that is fixed. Rates are in Hz. Mounts: of the leader's body, and of every follower's."""
 
     actuators: Actuators
     program: Program
@@ -74,6 +75,8 @@ class Lab(NamedTuple):
     odometry: OdometryError
     mocap_rate: float
     odometry_rate: float
+    leader_mount: Mount
+    follower_mount: Mount
 
 
 class World(NamedTuple):
@@ -333,7 +336,7 @@ def _led(world: World, lab: Lab, memory: Memory) -> World:
 @kernel
 def _shown(world: World, lab: Lab, memory: Memory, number: int) -> bool:
     """Put into ``shown`` what the motion capture shows now, faults included; False for no frame at all."""
-    pair = Pair(_observed(memory, lab.noise, number, 0), _observed(memory, lab.noise, number, 1))
+    pair = Pair(_observed(memory, lab, number, 0), _observed(memory, lab, number, 1))
     if size(memory.faults) > 0 and world.motion_since_ns >= 0:
         t, last = (world.time_ns - world.motion_since_ns) * _NS, pair
         if world.shown:
@@ -345,12 +348,12 @@ def _shown(world: World, lab: Lab, memory: Memory, number: int) -> bool:
     store(memory.shown, 0, pair.leader)
     store(memory.shown, 1, pair.follower)
     for k in range(2, size(memory.robots)):
-        store(memory.shown, k, _observed(memory, lab.noise, number, k))
+        store(memory.shown, k, _observed(memory, lab, number, k))
     return True
 
 
 @kernel(inline=False)
-def _observed(memory: Memory, noise: MocapNoise, number: int, k: int) -> Pose:
-    robots = size(memory.robots)
+def _observed(memory: Memory, lab: Lab, number: int, k: int) -> Pose:
+    robots, mount = size(memory.robots), lab.follower_mount if k > 0 else lab.leader_mount
     row = (number % size(memory.shares)) * robots + k
-    return observe(load(Robot, memory.robots, k), noise, load(BodyNormals, memory.normals, row))
+    return observe(load(Robot, memory.robots, k), lab.noise, load(BodyNormals, memory.normals, row), mount)

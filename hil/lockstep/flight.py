@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controllers.follower import Command
+from estimation.consistency.process_estimate import MEMBERS, Member
 from estimation.own_motion.odometry_check import WayEntry
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.own_motion.own_track import OwnPoint
@@ -130,6 +131,7 @@ class Rooms(NamedTuple):
     history: Rows[MotionSample]
     own: Rows[OwnPoint]
     ways: Rows[WayEntry]
+    bank: Rows[Member]
     sent: Rows[SentCommand]
     orders: Rows[Order]
     waiting: Rows[KeptEstimate]
@@ -146,6 +148,7 @@ def tracks_of(rooms: Rooms, share: Share, k: int) -> Tracks:
         part(MotionSample, rooms.history, k * share.history, share.history),
         part(OwnPoint, rooms.own, k * share.own, share.own),
         part(WayEntry, rooms.ways, k * share.ways, share.ways),
+        part(Member, rooms.bank, k * MEMBERS, MEMBERS),
     )
 
 

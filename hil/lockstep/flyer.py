@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.station_keeper import at_station
+from estimation.consistency.process_estimate import MEMBERS, Member
 from estimation.filters.filter import Filter
 from estimation.own_motion.odometry_check import WayEntry
 from estimation.own_motion.odometry_history import MotionSample
@@ -207,6 +208,7 @@ class Flyer:
             rows_of(MotionSample, n * share.history),
             rows_of(OwnPoint, n * share.own),
             rows_of(WayEntry, n * share.ways),
+            rows_of(Member, n * MEMBERS),
             rows_of(SentCommand, n * share.sent),
             self._orders,
             rows_of(KeptEstimate, n * (self._in_flight + 1)),
@@ -228,6 +230,7 @@ class Flyer:
             store(lab.robots, k, standing(pose))
             store(lab.reckoned, k, Reckoning(pose, pose))
         columns_of(lab.underway)["slot"] = np.arange(len(lab.underway))
+        columns_of(self.rooms.bank)[:] = 0
         for k, pair in enumerate(self._pairs):
             control = begun(at_station(station(pair)), EPOCH_NS)
             store(self.rooms.clocks, k, _NEW)

@@ -19,7 +19,7 @@ from formation.kernel import kernel
 from formation.pose import Motion
 from formation.records import load, size, store
 from hil.emulator.mocap import SeenPose
-from hil.emulator.robot import Robot, pose_of
+from hil.emulator.robot import Robot, pose_of, travelling
 from hil.emulator.world import (
     CAPTURE,
     FRAME,
@@ -146,9 +146,8 @@ def _captured(flight: Flight, plan: Plan, rooms: Rooms, happened: Happened, arri
     world, n = flight.world, size(rooms.clocks)
     for k in range(n):
         ahead, behind = load(Robot, rooms.lab.robots, k), load(Robot, rooms.lab.robots, k + 1)
-        true = TrueFrame(
-            happened.at_ns, arrives, pose_of(ahead), pose_of(behind), ahead.motion, behind.motion
-        )
+        led = travelling(ahead)
+        true = TrueFrame(happened.at_ns, arrives, led.pose, pose_of(behind), led.motion, behind.motion)
         store(rooms.truth, happened.number * n + k, true)
     flight = flight._replace(captures=happened.number + 1)
     if world.motion_since_ns < 0:
@@ -198,6 +197,7 @@ def _seen(
 ) -> int:
     """The k-th estimator takes in its pair; the number of estimates on their way."""
     rules, tracks = load(Rules, rooms.rules, k), tracks_of(rooms, plan.share, k)
+    seen = estimator_step.with_robot(seen, rules.mount)
     taken = estimator_step.take_frame(load(Known, rooms.knowns, k), tracks, rules, capture_ns, seen)
     store(rooms.knowns, k, taken.known)
     if taken.verdict in (DUPLICATE, LATE):
@@ -255,7 +255,17 @@ def _told(flight: Flight, plan: Plan, rooms: Rooms, kept: KeptEstimate, now_ns: 
         flight = flight._replace(estimates=flight.estimates + 1)
     control = at_time(load(ControlState, rooms.controls, k), now_ns)
     reported = Reported(
-        e.capture_ns, e.measured_ns, e.rho, e.alpha2, e.v1, e.alpha1, e.u1, e.joint.u_u, e.v2, e.u2
+        e.capture_ns,
+        e.measured_ns,
+        e.rho,
+        e.alpha2,
+        e.v1,
+        e.alpha1,
+        e.u1,
+        e.joint.u_u,
+        e.v2,
+        e.u2,
+        e.joint.b_u,
     )
     if not can_be(reported, now_ns):
         store(rooms.controls, k, control)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from estimation.consistency.process_estimate import Member
 from estimation.own_motion.odometry_check import WayEntry
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.own_motion.own_track import OwnPoint
@@ -56,6 +57,7 @@ def fly(
     history: Rows[MotionSample],
     own: Rows[OwnPoint],
     ways: Rows[WayEntry],
+    bank: Rows[Member],
     sent: Rows[SentCommand],
     orders: Rows[Order],
     waiting: Rows[KeptEstimate],
@@ -72,8 +74,8 @@ def fly(
     rooms = Rooms(
         lab, borrowed(clocks), borrowed(knowns), borrowed(controls), borrowed(rules),
         borrowed(control_rules), borrowed(points), borrowed(history), borrowed(own), borrowed(ways),
-        borrowed(sent), borrowed(orders), borrowed(waiting), borrowed(truth), borrowed(estimates),
-        borrowed(commands),
+        borrowed(bank), borrowed(sent), borrowed(orders), borrowed(waiting), borrowed(truth),
+        borrowed(estimates), borrowed(commands),
     )  # fmt: skip
     flight = flown(load(Flight, flights, 0), load(Plan, plans, 0), rooms)
     store(flights, 0, flight)

@@ -21,9 +21,12 @@ from hil.nodes.certifying import Believed, certifying
 from hil.nodes.estimator_inputs import RESTARTED, SEEN, SET_BACK, TICK_NS
 from hil.nodes.estimator_memory import EstimatorMemory, node_rules
 from hil.nodes.estimator_step import AUTO, MOCAP, Known, is_under_way
+from hil.nodes.findings import Findings, named_findings
 from hil.nodes.frame_time import clock_report
+from hil.nodes.leader_findings import leader_findings
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
-from hil.nodes.odometry_findings import FINDING, odometry_findings
+from hil.nodes.noise_report import noise_findings, noise_report, scale_of
+from hil.nodes.odometry_findings import odometry_findings
 from hil.nodes.sensor_offsets import offsets_report
 from hil.scenario.files import refuse_unrunnable
 from hil.scenario.schema import Scenario
@@ -81,6 +84,11 @@ class EstimatorState:
     def refused(self) -> Counts:
         """Inputs that were not used, by cause."""
         return self.memory.refused
+
+    @property
+    def noise_scale(self) -> float | None:
+        """Noise of positions as it is found over what is told, None where it is given."""
+        return scale_of(self.memory.known.noise, self.memory.rules.step.noise_learning)
 
 
 class EstimatorNode:
@@ -220,13 +228,23 @@ class EstimatorNode:
             if self.scenario.estimator.bias_states and known.track.length
             else {}
         )
+        values |= noise_report(known.noise, self.rules.step.noise_learning)
         if self.aligns:
             applied = state.comparison.applied._asdict()
             values |= {f"odometry.{name}": value for name, value in applied.items()}
-        found = odometry_findings(known, self.rules.step, now_ns)
-        values |= {FINDING + name: text for name, text in found.items()}
         values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)
+        values |= named_findings(self.findings(state, now_ns))
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
+
+    def findings(self, state: EstimatorState, now_ns: int) -> Findings:
+        """What is wrong with what the estimator gets, as long as it is; reads rows, and takes no step.
+
+        A replay in one pass asks too, and has loaded none of the node's own steps.
+        """
+        known, rules = state.memory.known, self.rules.step
+        noise = noise_findings(known.noise, rules.noise_learning)
+        found = odometry_findings(known, rules, now_ns) | noise
+        return found | leader_findings(known.travel, now_ns)
 
     def _missing(self, known: Known) -> str:
         """What the estimator waits for to begin."""

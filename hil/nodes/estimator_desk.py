@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controllers.guard import CLOCK_TOLERANCE_NS
+from estimation.consistency.noise_estimate import NOISE_AS_TOLD, kept_noise
+from estimation.consistency.process_estimate import NOTHING_LEARNED, Member
 from estimation.models.measurement import PairSeen
 from estimation.own_motion.odometry_check import UNCHECKED, OdometrySample, WayEntry, without_track
 from estimation.own_motion.odometry_history import IDEAL, MotionSample
@@ -12,6 +14,7 @@ from estimation.own_motion.own_track import OwnPoint
 from estimation.time.host_time import NO_TIME_YET, HostTime, TimeRows
 from estimation.tracking.estimate import Estimate
 from estimation.tracking.track_point import TrackPoint
+from estimation.tracking.travel_watch import NO_TRAVEL
 from formation.kernel import kernel
 from formation.records import Buffer, Rows, load, store
 from formation.ring import EMPTY
@@ -87,6 +90,7 @@ class Desk(NamedTuple):
     history: Rows[MotionSample]
     own: Rows[OwnPoint]
     ways: Rows[WayEntry]
+    bank: Rows[Member]
     known: Rows[Known]
     time: TimeRows
     notes: Rows[Notes]
@@ -104,7 +108,7 @@ class Desk(NamedTuple):
     @kernel
     def memory(self) -> Memory:
         """Where the tracks lie."""
-        return Memory(self.points, self.history, self.own, self.ways)
+        return Memory(self.points, self.history, self.own, self.ways, self.bank)
 
 
 @kernel
@@ -117,7 +121,7 @@ def noted(desk: Desk, digest: int, now_ns: int) -> bool:
     return now_ns >= notes.heard_ns - CLOCK_TOLERANCE_NS
 
 
-NOTHING_KNOWN = Known(EMPTY, EMPTY, EMPTY, IDEAL, UNCHECKED, 0)
+NOTHING_KNOWN = Known(EMPTY, EMPTY, EMPTY, IDEAL, UNCHECKED, 0, NOISE_AS_TOLD, NOTHING_LEARNED, NO_TRAVEL)
 
 
 @kernel
@@ -132,4 +136,5 @@ def forget_tracks(desk: Desk) -> None:
     known = load(Known, desk.known, 0)
     # What was added up of the track does not hang together with what comes.
     check = without_track(known.odometry_check)
-    store(desk.known, 0, known._replace(track=EMPTY, own=EMPTY, odometry_check=check))
+    noise = kept_noise(known.noise)
+    store(desk.known, 0, known._replace(track=EMPTY, own=EMPTY, odometry_check=check, noise=noise))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.consistency.process_estimate import MEMBERS, Member
 from estimation.filters.filter import Filter
 from estimation.own_motion.odometry_check import OdometrySample, WayEntry
 from estimation.own_motion.odometry_history import Correction, History, MotionSample
@@ -41,7 +42,16 @@ from hil.nodes.frame_time import time_rules
 from hil.nodes.node import Counts
 from hil.nodes.refusals import COUNTED, REFUSALS, TAKEN, TAKEN_FRAME
 from hil.nodes.status_reasons import ALL_REASONS
-from hil.scenario.leader_model import input_trust, leader_filter, own_noise, pose_noise, track_settings
+from hil.scenario.leader_model import (
+    follower_mount,
+    input_trust,
+    leader_filter,
+    noise_learning,
+    own_noise,
+    pose_noise,
+    process_learning,
+    track_settings,
+)
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire.assumed_errors import AssumedErrors
@@ -55,7 +65,7 @@ from hil.wire.writing import MOST_RECEIPTS
 if TYPE_CHECKING:
     from hil.nodes.estimator_entries import Steps
 
-HISTORY = 2.0
+HISTORY = 4.0
 """Seconds of odometry kept, enough for the latest frame that the ring can take."""
 
 WAYS = 64
@@ -83,6 +93,9 @@ def rules_of(scenario: Scenario) -> Rules:
         noise=pose_noise(scenario),
         trust=input_trust(scenario),
         own_noise=own_noise(scenario),
+        noise_learning=noise_learning(scenario),
+        mount=follower_mount(scenario),
+        process_learning=process_learning(scenario),
     )
 
 
@@ -132,6 +145,7 @@ class EstimatorMemory:
             history=rows_of(MotionSample, room_for(rules.step.span)),
             own=rows_of(OwnPoint, room),
             ways=rows_of(WayEntry, WAYS),
+            bank=rows_of(Member, MEMBERS),
             known=row_of(NOTHING_KNOWN),
             time=time_rows(),
             notes=row_of(NOTHING_NOTED),
@@ -163,7 +177,8 @@ class EstimatorMemory:
     def copy(self) -> EstimatorMemory:
         """The same memory, to go on from twice."""
         twin = EstimatorMemory(self.rules, self.reader, self._wanted, self._template)
-        for name in ("points", "history", "own", "ways", "known", "notes", "receipts", "counts", "newest"):
+        rows = ("points", "history", "own", "ways", "bank", "known", "notes", "receipts", "counts", "newest")
+        for name in rows:
             getattr(twin.desk, name)[:] = getattr(self.desk, name)
         for kept, other in zip(_columns(self.desk.time), _columns(twin.desk.time), strict=True):
             other[:] = kept
