@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from controllers.station_keeper import at_station
 from estimation.filters.filter import Filter
-from estimation.own_motion.odometry_history import IDEAL, MotionSample
+from estimation.own_motion.odometry_history import MotionSample
 from estimation.own_motion.own_track import OwnPoint
 from estimation.tracking.prediction import SentCommand, rows_for
 from estimation.tracking.track_point import TrackPoint
 from formation.pose import Motion
 from formation.records import Rows, columns_of, row_of, rows_of, store
-from formation.ring import EMPTY
 from hil.emulator.mocap import BodyNormals, Shares, Stream, block_length, draw_into
 from hil.emulator.plant import lab_of, memory_of, world_at
 from hil.emulator.robot import standing
@@ -40,6 +39,7 @@ from hil.lockstep.flight import (
 from hil.lockstep.lockstep import EPOCH_NS
 from hil.nodes.control_rules import control_rules
 from hil.nodes.controller_step import ControlRules, ControlState, begun
+from hil.nodes.estimator_desk import NOTHING_KNOWN
 from hil.nodes.estimator_memory import HISTORY, room_for, rules_of
 from hil.nodes.estimator_step import Known, Rules
 from hil.scenario.links import links_of
@@ -226,7 +226,7 @@ class Flyer:
         for k, pair in enumerate(self._pairs):
             control = begun(at_station(station(pair)), EPOCH_NS)
             store(self.rooms.clocks, k, _NEW)
-            store(self.rooms.knowns, k, Known(EMPTY, EMPTY, EMPTY, IDEAL))
+            store(self.rooms.knowns, k, NOTHING_KNOWN)
             store(self.rooms.controls, k, control)
 
     def _draw(self, seed: int) -> None:

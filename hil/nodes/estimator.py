@@ -20,6 +20,7 @@ from hil.nodes.certifying import Believed, certifying
 from hil.nodes.estimator_inputs import RESTARTED, SEEN, SET_BACK, TICK_NS
 from hil.nodes.estimator_memory import EstimatorMemory, node_rules
 from hil.nodes.frame_time import clock_report
+from hil.nodes.mount_report import mount_problem, mount_report
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
 from hil.nodes.sensor_offsets import offsets_report
 from hil.scenario.files import refuse_unrunnable
@@ -208,8 +209,11 @@ class EstimatorNode:
         """Diagnostics: status of the track, inputs taken and refused."""
         known = state.memory.known
         moving = known.own if self.scenario.estimator.own_motion == "mocap" else known.odometry
+        stops = self.rules.step.mounts.stops
         problem = "" if known.track.length and moving.length else "waiting for mocap and odometry"
+        problem = problem or mount_problem(known.mount_check, stops=stops)
         values: dict[str, object] = {"status": state.memory.status(now_ns).name.lower()}
+        values |= mount_report(known.mount_check)
         values |= clock_report(state.times, state.memory.desk.time)
         values |= (
             offsets_report(state.memory.track[-1].belief)

@@ -10,6 +10,7 @@ from estimation.own_motion.odometry_history import IDEAL, MotionSample
 from estimation.own_motion.own_track import OwnPoint
 from estimation.time.host_time import NO_TIME_YET, HostTime, TimeRows
 from estimation.tracking.estimate import Estimate
+from estimation.tracking.mount_check import NO_MOUNT_CHECK
 from estimation.tracking.track_point import TrackPoint
 from formation.kernel import kernel
 from formation.records import Buffer, Rows, load, store
@@ -115,7 +116,7 @@ def noted(desk: Desk, digest: int, now_ns: int) -> bool:
     return now_ns >= notes.heard_ns - CLOCK_TOLERANCE_NS
 
 
-NOTHING_KNOWN = Known(EMPTY, EMPTY, EMPTY, IDEAL)
+NOTHING_KNOWN = Known(EMPTY, EMPTY, EMPTY, IDEAL, NO_MOUNT_CHECK)
 
 
 @kernel

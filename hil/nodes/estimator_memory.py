@@ -35,7 +35,7 @@ from hil.nodes.estimator_desk import (
     SensorRules,
     TimedFrame,
 )
-from hil.nodes.estimator_step import FUSED, MOCAP, ODOMETRY, Known, Rules, Told, estimate
+from hil.nodes.estimator_step import FUSED, MOCAP, ODOMETRY, Known, MountRules, Rules, Told, estimate
 from hil.nodes.frame_time import time_rules
 from hil.nodes.node import Counts
 from hil.nodes.refusals import COUNTED, REFUSALS, TAKEN, TAKEN_FRAME
@@ -86,7 +86,7 @@ def rules_of(scenario: Scenario) -> Rules:
         noise=pose_noise(scenario),
         trust=input_trust(scenario),
         own_noise=own_noise(scenario),
-        mount=follower_mount(scenario),
+        mounts=MountRules(follower_mount(scenario), scenario.controller.mount_check == "stop"),
     )
 
 

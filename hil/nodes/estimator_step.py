@@ -40,10 +40,13 @@ from estimation.own_motion.own_track import (
     own_reprocessed,
 )
 from estimation.tracking.estimate import Estimate, estimate_at
-from estimation.tracking.follower_check import BELIEVED
+from estimation.tracking.follower_check import BELIEVED, FOLLOWER, MOUNT
 from estimation.tracking.follower_check import GATED as LEADER_OFF
-from estimation.tracking.track_point import DUPLICATE, GATED, LATE, TrackPoint
+from estimation.tracking.mount_check import MountCheck, is_off, watched
+from estimation.tracking.track_point import DUPLICATE, GATED, LATE, RESTARTED, TrackPoint
 from estimation.tracking.tracker import (
+    REJECTING,
+    TRACKING,
     TrackSettings,
     add,
     capture_at,
@@ -63,12 +66,22 @@ ODOMETRY, MOCAP, FUSED = 0, 1, 2
 """Where the follower's motion is known from."""
 
 
+class MountRules(NamedTuple):
+    """Where the follower's body sits, and whether it is stopped if that is plainly wrong."""
+
+    follower: Mount
+    stops: bool
+
+
+NO_MOUNT_RULES = MountRules(NO_MOUNT, stops=False)
+
+
 class Rules(NamedTuple):
     """All that is fixed about an estimator.
 
     source: where the follower's motion is from. reprocesses: whether odometry that comes late is folded in
-    again. span: seconds of odometry kept. noise: of a mocap pose. mount: of the follower's
-    body.
+    again. span: seconds of odometry kept. noise: of a mocap pose. mounts: of the
+    follower's body.
     """
 
     settings: TrackSettings
@@ -79,7 +92,7 @@ class Rules(NamedTuple):
     noise: PoseNoise
     trust: InputTrust
     own_noise: OwnNoise
-    mount: Mount = NO_MOUNT
+    mounts: MountRules = NO_MOUNT_RULES
 
 
 class Memory(NamedTuple):
@@ -91,12 +104,13 @@ class Memory(NamedTuple):
 
 
 class Known(NamedTuple):
-    """Where the rows are filled, and by what odometry is corrected."""
+    """Where the rows are filled, by what odometry is corrected, and what is left of the follower's mount."""
 
     track: Ring
     odometry: Ring
     own: Ring
     correction: Correction
+    mount_check: MountCheck
 
 
 class Taken(NamedTuple):
@@ -116,12 +130,12 @@ class Told(NamedTuple):
 
 
 @kernel
-def with_robot(seen: PairSeen, mount: Mount) -> PairSeen:
+def with_robot(seen: PairSeen, rules: MountRules) -> PairSeen:
     """What a frame shows, with the follower's own pose in the place of its body's.
 
     The leader's stays its body's, which only the filter knows how to tell from the leader.
     """
-    return seen._replace(follower=robot_pose(seen.follower, mount))
+    return seen._replace(follower=robot_pose(seen.follower, rules.follower))
 
 
 @kernel
@@ -143,6 +157,21 @@ def due_pose(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: 
 @kernel
 def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
     """Take in a mocap frame that was captured at a time by the host's clock."""
+    taken = _tracked(known, memory, rules, capture_ns, seen)
+    if taken.late or taken.verdict == DUPLICATE or taken.verdict == LATE:
+        return taken
+    # An outlier of the follower may be one by a wrong mount.
+    plain = taken.cause == BELIEVED or taken.cause == LEADER_OFF or taken.cause == FOLLOWER
+    if not plain:
+        return taken
+    jumped = taken.verdict == RESTARTED
+    check = watched(taken.known.mount_check, capture_ns, seen.follower, rules.noise, jumped)
+    return taken._replace(known=taken.known._replace(mount_check=check))
+
+
+@kernel
+def _tracked(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
+    """Take a frame into the tracks."""
     if rules.source == ODOMETRY:
         motion = by_odometry(known, memory, rules, capture_ns)
         return take(known, memory, rules, measured(rules, capture_ns, seen, motion))
@@ -265,4 +294,7 @@ def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) 
     """Newest estimate of a track that has one, its status as seen at ``now_ns``."""
     point = newest(points, known.track)
     point = point._replace(belief=rules.filter.leader(point.belief, point.measurement))
-    return Told(estimate_at(point, status_of(point, now_ns, rules.settings)), point.cause)
+    status, cause = status_of(point, now_ns, rules.settings), point.cause
+    if status == TRACKING and rules.mounts.stops and is_off(known.mount_check):
+        status, cause = REJECTING, MOUNT
+    return Told(estimate_at(point, status), cause)

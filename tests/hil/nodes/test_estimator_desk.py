@@ -4,6 +4,7 @@ import pytest
 
 from controllers.guard import CLOCK_TOLERANCE_NS
 from estimation.own_motion.odometry_history import Correction
+from estimation.tracking.mount_check import NO_MOUNT_CHECK
 from formation.records import load, store
 from formation.ring import EMPTY, Ring
 from hil.nodes.estimator import EstimatorNode
@@ -47,7 +48,7 @@ def test_tracks_and_odometry_lie_where_they_are_named() -> None:
 
 
 def filled(desk: Desk) -> Known:
-    known = Known(Ring(1, 2), Ring(3, 4), Ring(5, 6), Correction(0.01, 0.1, 0.2))
+    known = Known(Ring(1, 2), Ring(3, 4), Ring(5, 6), Correction(0.01, 0.1, 0.2), NO_MOUNT_CHECK)
     store(desk.known, 0, known)
     return known
 
