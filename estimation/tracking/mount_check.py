@@ -26,7 +26,7 @@ _CLEAR = 6.0  # standard deviations of noise that an arc is longer than, or turn
 _MEMORY = 0.99  # of what was known per arc that moves: a body that is knocked aside is noticed, too
 _SLIP = 0.02  # share of an arc by which it may go aside without a mount being off
 _LIKELY_PLACE = 0.15  # [m]: how far off the middle of the wheel axis a body may sit, as a standard deviation
-_FEWEST = 6  # arcs before anything is said
+_FEWEST = 8  # arcs before anything is said
 _OUTLIER = 3.0  # standard deviations from which on an arc counts less
 _SURE = 4.0  # standard deviations by which anything said is off zero
 
@@ -40,7 +40,7 @@ class MountCheck(NamedTuple):
     """What is known of a mount that is left over: sums over arcs, older ones counting less.
 
     ``begun``, ``since_ns``, ``since``: the arc under way. Of each arc ``ahead`` [m] along the mean heading,
-    ``turn`` [rad] and ``aside`` [m] across; ``rest``: sum of squared residuals in variances, of ``arcs``.
+    ``turn`` [rad] and ``aside`` [m] across, in standard deviations of the latter; ``arcs``: their number.
     """
 
     begun: bool
@@ -51,7 +51,7 @@ class MountCheck(NamedTuple):
     turn_turn: float
     ahead_aside: float
     turn_aside: float
-    rest: float
+    aside_aside: float
     arcs: float
 
 
@@ -61,7 +61,7 @@ NO_MOUNT_CHECK = MountCheck(False, 0, Pose(0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0
 class MountLeft(NamedTuple):
     """Yaw [rad] and place [m] ahead of the wheel axis that are left over, with their standard deviations.
 
-    Not ``known`` before there were enough arcs.
+    Not ``known`` before there were enough arcs. ``usual``: by how much more arcs vary than noise lets them.
     """
 
     known: bool
@@ -69,6 +69,7 @@ class MountLeft(NamedTuple):
     place: float
     sd_yaw: float
     sd_place: float
+    usual: float
 
 
 @kernel
@@ -102,8 +103,7 @@ def _with_arc(check: MountCheck, pose: Pose, turn: float, noise: PoseNoise) -> M
     off = 0.0
     if left.known:
         off = (aside + ahead * math.tan(left.yaw) - bend * left.place) / math.sqrt(variance)
-    usual = max(1.0, check.rest / max(check.arcs, 1.0))
-    far = abs(off) / (_OUTLIER * math.sqrt(usual))
+    far = abs(off) / (_OUTLIER * math.sqrt(left.usual))
     weight = 1.0 if far <= 1.0 else 1.0 / far
     share = weight / variance
     return check._replace(
@@ -113,25 +113,32 @@ def _with_arc(check: MountCheck, pose: Pose, turn: float, noise: PoseNoise) -> M
         turn_turn=_MEMORY * check.turn_turn + share * max(0.0, bend * bend - twist),
         ahead_aside=_MEMORY * check.ahead_aside - share * ahead * aside,
         turn_aside=_MEMORY * check.turn_aside + share * bend * aside,
-        rest=_MEMORY * check.rest + weight * off * off,
+        aside_aside=_MEMORY * check.aside_aside + share * aside * aside,
         arcs=_MEMORY * check.arcs + 1.0,
     )
+
+
+@kernel
+def _nothing_left() -> MountLeft:
+    return MountLeft(False, 0.0, 0.0, math.inf, math.inf, 1.0)
 
 
 @kernel
 def mount_left(check: MountCheck) -> MountLeft:
     """Yaw and place by least squares; residuals that are larger than noise make them the less certain."""
     if check.arcs < _FEWEST:
-        return MountLeft(False, 0.0, 0.0, math.inf, math.inf)
-    usual = max(1.0, check.rest / check.arcs)
+        return _nothing_left()
     p, q = check.ahead_ahead, check.ahead_turn
-    r = check.turn_turn + usual / (_LIKELY_PLACE * _LIKELY_PLACE)
+    r = check.turn_turn + 1.0 / (_LIKELY_PLACE * _LIKELY_PLACE)
     det = p * r - q * q
     if not det > 1e-9 * p * r:
-        return MountLeft(False, 0.0, 0.0, math.inf, math.inf)
+        return _nothing_left()
     slope = (r * check.ahead_aside - q * check.turn_aside) / det
     place = (p * check.turn_aside - q * check.ahead_aside) / det
-    return MountLeft(True, math.atan(slope), place, math.sqrt(usual * r / det), math.sqrt(usual * p / det))
+    rest = check.aside_aside - slope * check.ahead_aside - place * check.turn_aside
+    usual = max(1.0, rest / (check.arcs - 2.0))
+    sd_yaw, sd_place = math.sqrt(usual * r / det), math.sqrt(usual * p / det)
+    return MountLeft(True, math.atan(slope), place, sd_yaw, sd_place, usual)
 
 
 @kernel
