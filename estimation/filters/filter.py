@@ -15,7 +15,7 @@ from estimation.filters.difference import differenced, first_difference
 from estimation.filters.ekf import extended_moved, informed, mean_of, seen_by_follower
 from estimation.filters.gaussian import Gaussian, nis_of, started
 from estimation.filters.leader_prior import standing_noise, within_limits
-from estimation.filters.lever_arm import NO_LEVER, Lever, robot_under, swung
+from estimation.filters.lever_arm import NO_LEVER, Lever, is_centred, robot_under, swung
 from estimation.filters.ukf import unscented_moved
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, moved
 from estimation.models.measurement import FrontEnd, Measurement
@@ -85,7 +85,7 @@ class Filter(NamedTuple):
             ahead = unscented_moved(belief, dt, noise)
         else:
             ahead = extended_moved(belief, dt, noise)
-        if not self.lever.vanishes():
+        if not is_centred(self.lever):
             ahead = swung(ahead, belief, self.lever, self.limits.v_eps, noise.q_u, dt)
         if self.kind == DIFFERENCE:
             rates = belief.rates
@@ -106,7 +106,7 @@ class Filter(NamedTuple):
     @kernel
     def leader(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
         """Belief about the leader itself, the newest measurement being given; sightings see no body."""
-        if self.lever.vanishes() or not measurement.framed:
+        if is_centred(self.lever) or not measurement.framed:
             return belief
         return robot_under(belief, self.lever, self.limits.v_eps)
 

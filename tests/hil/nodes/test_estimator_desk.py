@@ -7,6 +7,8 @@ from estimation.consistency.noise_estimate import NOISE_AS_TOLD, NoiseScale, kep
 from estimation.consistency.process_estimate import NOTHING_LEARNED
 from estimation.own_motion.odometry_check import UNCHECKED
 from estimation.own_motion.odometry_history import Correction
+from estimation.tracking.mount_check import NO_MOUNT_CHECK
+from estimation.tracking.travel_watch import NO_TRAVEL
 from formation.records import load, store
 from formation.ring import EMPTY, Ring
 from hil.nodes.estimator import EstimatorNode
@@ -60,7 +62,9 @@ PROCESS = NOTHING_LEARNED._replace(speed=0.5, turn=2.0)
 
 def filled(desk: Desk) -> Known:
     check = UNCHECKED._replace(heard=True, resets=1)
-    known = Known(Ring(1, 2), Ring(3, 4), Ring(5, 6), Correction(0.01, 0.1, 0.2), check, 7, LEARNED, PROCESS)
+    correction = Correction(0.01, 0.1, 0.2)
+    rings = Ring(1, 2), Ring(3, 4), Ring(5, 6)
+    known = Known(*rings, correction, check, 7, LEARNED, PROCESS, NO_TRAVEL, NO_MOUNT_CHECK)
     store(desk.known, 0, known)
     return known
 
