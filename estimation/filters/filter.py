@@ -13,7 +13,7 @@ from typing import NamedTuple
 from estimation.filters.belief import Model
 from estimation.filters.difference import differenced, first_difference
 from estimation.filters.ekf import driven, extended_carried, informed, mean_of, seen_by_follower
-from estimation.filters.gaussian import Gaussian, nis_of, started
+from estimation.filters.gaussian import Gaussian, nis_of, started, widened
 from estimation.filters.lever_arm import NO_LEVER, Lever, at_body, at_robot
 from estimation.filters.ukf import unscented_carried
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, moved
@@ -102,6 +102,11 @@ class Filter(NamedTuple):
         if self._shows_body(measurement):
             return self._informed_by_body(belief, measurement)
         return informed(belief, measurement.x, measurement.y, measurement.spread)
+
+    @kernel
+    def widened(self, belief: Gaussian, by: float) -> Gaussian:
+        """Belief whose measurements turn out to have had errors of a larger variance, by a factor."""
+        return widened(belief, by, self.limits)
 
     @kernel
     def shown(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
