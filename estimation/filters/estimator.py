@@ -133,8 +133,8 @@ class Interpreted:
         """Itself; see :meth:`~estimation.filters.filter.Filter.widened`."""
         return belief
 
-    def shown(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
-        """See :meth:`~estimation.filters.filter.Filter.shown`; no lever arm is known of here."""
+    def leader(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
+        """See :meth:`~estimation.filters.filter.Filter.leader`; no lever arm is known of here."""
         return belief
 
     def step(
