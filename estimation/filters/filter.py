@@ -13,7 +13,7 @@ from typing import NamedTuple
 from estimation.filters.belief import Model
 from estimation.filters.difference import differenced, first_difference
 from estimation.filters.ekf import extended_moved, informed, mean_of, seen_by_follower
-from estimation.filters.gaussian import Gaussian, nis_of, started
+from estimation.filters.gaussian import Gaussian, nis_of, started, widened
 from estimation.filters.leader_prior import standing_noise, within_limits
 from estimation.filters.lever_arm import NO_LEVER, Lever, is_centred, robot_under, swung
 from estimation.filters.ukf import unscented_moved
@@ -102,6 +102,11 @@ class Filter(NamedTuple):
         if self.kind == DIFFERENCE:
             return differenced(belief, measurement, self.limits, self.cutoff)
         return informed(belief, measurement.x, measurement.y, measurement.spread)
+
+    @kernel
+    def widened(self, belief: Gaussian, by: float) -> Gaussian:
+        """Belief whose measurements turn out to have had errors of a larger variance, by a factor."""
+        return widened(belief, by, self.limits)
 
     @kernel
     def leader(self, belief: Gaussian, measurement: Measurement) -> Gaussian:

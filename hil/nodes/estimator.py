@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
+from estimation.bounds.certified import Certain, Failed
 from estimation.own_motion.odometry_correction import (
     NOTHING_SEEN,
     OdometryComparison,
@@ -26,7 +27,7 @@ from hil.nodes.frame_time import clock_report
 from hil.nodes.leader_findings import leader_findings
 from hil.nodes.mount_report import mount_findings, mount_problem, mount_report
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
-from hil.nodes.noise_report import noise_findings, noise_report, scale_of
+from hil.nodes.noise_report import is_refuted, noise_findings, noise_report, scale_of
 from hil.nodes.odometry_findings import odometry_findings
 from hil.nodes.sensor_offsets import offsets_report
 from hil.scenario.files import refuse_unrunnable
@@ -204,7 +205,9 @@ class EstimatorNode:
         if self.certifying is None:
             return (estimate,)
         newest = load(Estimate, state.memory.desk.newest, 0)
-        certain = self.certifying.certain(state.believed, state.memory.history, capture_ns)
+        certain: Certain | Failed = Failed.NOISE
+        if not is_refuted(state.noise_scale):
+            certain = self.certifying.certain(state.believed, state.memory.history, capture_ns)
         certified = certified_message(newest, certain, now_ns, self.topics.follower)
         return estimate, outgoing(self.topics.certified, certified, capture_ns)
 

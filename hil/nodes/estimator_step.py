@@ -13,11 +13,13 @@ from estimation.consistency.noise_estimate import (
     Moment,
     NoiseEstimate,
     NoiseLearning,
+    is_another,
     noise_with_frame,
     noise_with_sighting,
     scaled_noise,
 )
 from estimation.consistency.process_estimate import (
+    MEMBERS,
     LearnedProcess,
     Member,
     ProcessLearning,
@@ -93,7 +95,7 @@ from estimation.tracking.tracker import (
 from estimation.tracking.travel_watch import TravelWatch, watched
 from formation.kernel import kernel
 from formation.mount import NO_MOUNT, Mount, robot_pose
-from formation.records import Rows, store
+from formation.records import Rows, load, store
 from formation.ring import Ring, place
 
 _NS = 1e-9
@@ -301,7 +303,26 @@ def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen
         gated = taken.cause != BELIEVED
         learned = noise_with_frame(known.noise, Moment(capture_ns, seen), gated, rules.noise_learning)
         after = after._replace(noise=learned)
+        if is_another(learned):
+            after = _on_other_noise(after, memory, rules.filter)
     return taken._replace(known=after)
+
+
+@kernel
+def _on_other_noise(known: Known, memory: Memory, estimator: Filter) -> Known:
+    """The same where the noise turns out to be another one than all rests on that was learned before.
+
+    How the leader drives was weighed against that, and of a larger noise the belief is less certain.
+    """
+    points, ring, noise = memory.points, known.track, known.noise
+    if ring.length > 0 and noise.scale.position > noise.basis:
+        by, point = noise.scale.position / noise.basis, newest(points, ring)
+        wider = estimator.widened(point.belief, by * by)
+        store(points, place(ring, points, ring.length - 1), point._replace(belief=wider))
+    for k in range(MEMBERS):
+        store(memory.bank, k, load(Member, memory.bank, k)._replace(score=0.0))
+    noise = noise._replace(basis=noise.scale.position)
+    return known._replace(noise=noise, process=restarted(known.process)._replace(speed=1.0, turn=1.0))
 
 
 @kernel

@@ -7,8 +7,6 @@ from estimation.consistency.noise_estimate import NOISE_AS_TOLD, NoiseScale, kep
 from estimation.consistency.process_estimate import NOTHING_LEARNED
 from estimation.own_motion.odometry_check import UNCHECKED
 from estimation.own_motion.odometry_history import Correction
-from estimation.tracking.mount_check import NO_MOUNT_CHECK
-from estimation.tracking.travel_watch import NO_TRAVEL
 from formation.records import load, store
 from formation.ring import EMPTY, Ring
 from hil.nodes.estimator import EstimatorNode
@@ -62,9 +60,16 @@ PROCESS = NOTHING_LEARNED._replace(speed=0.5, turn=2.0)
 
 def filled(desk: Desk) -> Known:
     check = UNCHECKED._replace(heard=True, resets=1)
-    correction = Correction(0.01, 0.1, 0.2)
-    rings = Ring(1, 2), Ring(3, 4), Ring(5, 6)
-    known = Known(*rings, correction, check, 7, LEARNED, PROCESS, NO_TRAVEL, NO_MOUNT_CHECK)
+    known = NOTHING_KNOWN._replace(
+        track=Ring(1, 2),
+        odometry=Ring(3, 4),
+        own=Ring(5, 6),
+        correction=Correction(0.01, 0.1, 0.2),
+        odometry_check=check,
+        watched_ns=7,
+        noise=LEARNED,
+        process=PROCESS,
+    )
     store(desk.known, 0, known)
     return known
 
