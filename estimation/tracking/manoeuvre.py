@@ -21,7 +21,7 @@ LARGEST_SHARE = 3.0
 """Standard deviations that an innovation counts for at most: two gated outliers in a row are no run."""
 
 ALARM = 9.0
-"""Logarithm [nat] of how much likelier a run must be than chance: one false alarm in many thousand innovations."""
+"""Logarithm [nat] of how much likelier a run must be than chance: one in many thousand innovations is false."""
 
 LASTS = 0.15
 """How long [s] the noise stays raised after an alarm: about as long as a robot's actuators take."""
