@@ -18,7 +18,8 @@ from estimation.filters.ekf import informed
 from estimation.filters.filter import EKF, Filter
 from estimation.filters.gaussian import Gaussian, nis_of
 from estimation.models.coordinated_turn import FollowerMotion, ProcessNoise, Spread, mean_motion
-from estimation.models.measurement import Measurement
+from estimation.models.measurement import NO_MOTION, Measurement
+from estimation.tracking.track_point import TrackPoint
 from formation.kernel import kernel
 from formation.records import Rows, load, store
 
@@ -44,6 +45,7 @@ _INTERVAL_NS = 30_000_000
 _SETTLING_NS = 500_000_000
 _LARGEST_NIS = 400.0  # a member further off starts again from the main filter
 _NS = 1e-9
+_SAME = 1e-6  # [s]
 
 
 class ProcessLearning(NamedTuple):
@@ -82,7 +84,9 @@ class LearnedProcess(NamedTuple):
     speed, turn: ratios of q_v and q_u to what is told. settled_ns: since when the track is settled, 0 if it
     is not. begun: whether the bank runs. at_ns: time of its beliefs. ended_ns: capture of the last
     measurement in them; motion: of the follower then. count, later_ns, x, y: number of measurements put
-    together since, the sum of their times after ``ended_ns``, and sums of positions.
+    together since, the sum of their times after ``ended_ns``, and sums of positions. way_s, way:
+    time [s] since ``ended_ns`` over which the follower's way is known, and the sums of its motion over that,
+    its variances times time.
     """
 
     speed: float
@@ -96,6 +100,8 @@ class LearnedProcess(NamedTuple):
     later_ns: int
     x: float
     y: float
+    way_s: float = 0.0
+    way: FollowerMotion = NO_MOTION
 
 
 NOTHING_LEARNED = LearnedProcess(1.0, 1.0, 0, False, 0, 0, FollowerMotion(0.0, 0.0, 0.0, 0.0), 0, 0, 0.0, 0.0)
@@ -109,15 +115,10 @@ def learned_noise(learned: LearnedProcess, rules: ProcessLearning) -> ProcessNoi
 
 @kernel(inline=False)
 def learn(
-    learned: LearnedProcess,
-    bank: Rows[Member],
-    measurement: Measurement,
-    belief: Gaussian,
-    settled: bool,
-    rules: ProcessLearning,
-    estimator: Filter,
+    learned: LearnedProcess, bank: Rows[Member], point: TrackPoint, rules: ProcessLearning, estimator: Filter
 ) -> LearnedProcess:
-    """Learn from a measurement in its order that the main filter has used; ``belief``: what it made of it."""
+    """Learn from a measurement in its order that the main filter has used: the newest point of its track."""
+    measurement, belief, settled = point.measurement, point.belief, point.settled
     now_ns = measurement.capture_ns
     if not learned.begun:
         return _waiting(learned, bank, measurement, belief, settled)
@@ -127,10 +128,36 @@ def learn(
     if not measurement.in_world:
         # Along the follower's axes, which turn, positions of different times have no mean.
         count, later_ns, x, y = 1, since_ns, measurement.x, measurement.y
+    learned = _with_way(learned, point)
     learned = learned._replace(count=count, later_ns=later_ns, x=x, y=y)
     if since_ns < _INTERVAL_NS:
         return learned
     return _scored(learned, bank, measurement, belief, rules, estimator)
+
+
+@kernel
+def _with_way(learned: LearnedProcess, point: TrackPoint) -> LearnedProcess:
+    """The same with the follower's way to a point added; in the world frame that makes no difference."""
+    if point.measurement.in_world:
+        return learned
+    was, way, dt = learned.way, point.way, point.way_s
+    added = FollowerMotion(
+        was.v2 + way.v2 * dt,
+        was.u2 + way.u2 * dt,
+        was.sd_v2 + way.sd_v2 * way.sd_v2 * dt,
+        was.sd_u2 + way.sd_u2 * way.sd_u2 * dt,
+    )
+    return learned._replace(way_s=learned.way_s + dt, way=added)
+
+
+@kernel
+def _way_of(learned: LearnedProcess, measurement: Measurement, dt: float) -> FollowerMotion:
+    """Mean motion since the members' time: by the whole way where that is known, else by its ends."""
+    way, span = learned.way, learned.way_s
+    if measurement.in_world or abs(span - dt) > _SAME:
+        return mean_motion(learned.motion, measurement.motion)
+    by = 1.0 / span
+    return FollowerMotion(way.v2 * by, way.u2 * by, math.sqrt(way.sd_v2 * by), math.sqrt(way.sd_u2 * by))
 
 
 @kernel
@@ -166,6 +193,8 @@ def _waiting(
         later_ns=0,
         x=0.0,
         y=0.0,
+        way_s=0.0,
+        way=FollowerMotion(0.0, 0.0, 0.0, 0.0),
     )
 
 
@@ -184,7 +213,7 @@ def _scored(
     given = measurement.spread
     spread = Spread(given.xx / many, given.xy / many, given.yy / many)
     dt = (due_ns - learned.at_ns) * _NS
-    motion = mean_motion(learned.motion, measurement.motion)
+    motion = _way_of(learned, measurement, dt)
     kept, found = math.exp(-dt / FORGOTTEN), learned_noise(learned, rules)
     tried = rules.turn * TURN_LOWEST
     for k in range(TURN_MEMBERS):
@@ -206,6 +235,8 @@ def _scored(
         later_ns=0,
         x=0.0,
         y=0.0,
+        way_s=0.0,
+        way=FollowerMotion(0.0, 0.0, 0.0, 0.0),
     )
 
 

@@ -56,8 +56,8 @@ def import_csv(recording: Path, chart: ColumnMap, out: Path) -> Imported:
 def _messages(number: int, row: Row, chart: ColumnMap, names: Topics) -> Iterator[tuple[str, msg.Message]]:
     """Messages of a row, in the order in which the robot had them."""
     measurement = _sighting(row, names) if chart.sighted else _frame(number, row, names)
-    motion = (names.odom, _odometry(row, names))
-    yield from (measurement, motion) if chart.commanded else (motion, measurement)
+    motion = [(names.odom, _odometry(row, names))] if chart.moved else []
+    yield from [measurement, *motion] if chart.commanded else [*motion, measurement]
     if chart.truth:
         yield topics.TRUTH, _truth(number, row)
 

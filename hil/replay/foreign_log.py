@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__PoseStamped a
 from hil.errors import UsageError
 from hil.log.events import Timed
 from hil.log.reader import Log, Record
-from hil.replay.topic_map import TopicMap
+from hil.replay.topic_map import TopicMap, needs_odometry
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.events import Event
@@ -24,8 +24,9 @@ _FRAMES = (typename_of(msg.RigidBodies), "mocap_msgs/msg/RigidBodies")
 _POSES = (typename_of(PoseStamped), typename_of(msg.Odometry))
 _MOTIONS = (typename_of(msg.Odometry), typename_of(msg.TwistStamped))
 _UNKNOWN_COVARIANCE = np.zeros(36)
-_ORIGIN = msg.Pose(
-    position=msg.Point(x=0.0, y=0.0, z=0.0), orientation=msg.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
+# A quaternion of zeros stands for none.
+_NO_POSE = msg.Pose(
+    position=msg.Point(x=0.0, y=0.0, z=0.0), orientation=msg.Quaternion(x=0.0, y=0.0, z=0.0, w=0.0)
 )
 
 
@@ -143,13 +144,16 @@ def _poses(log: Log, chart: TopicMap, name: str) -> list[_SeenPose]:
 
 
 def _motions(log: Log, chart: TopicMap) -> list[_Input]:
-    topic = _present(log, chart, chart.topics.odometry, _MOTIONS)
-    own = topics_of(chart.scenario)
+    name, own = chart.topics.odometry, topics_of(chart.scenario)
+    if name is None or (name not in _bare(log.topics) and not _is_missed(log, chart)):
+        return []
+    topic = _present(log, chart, name, _MOTIONS)
     motions: list[_Input] = []
     for record, message in _messages(log, topic):
         if isinstance(message, msg.Odometry):
-            twist = message.twist
+            pose, twist = message.pose.pose, message.twist
         elif isinstance(message, msg.TwistStamped):
+            pose = _NO_POSE
             twist = msg.TwistWithCovariance(twist=message.twist, covariance=_UNKNOWN_COVARIANCE)
         else:
             continue
@@ -157,13 +161,21 @@ def _motions(log: Log, chart: TopicMap) -> list[_Input]:
         odometry = msg.Odometry(
             header=header(stamp_ns, f"{own.follower}/odom"),
             child_frame_id=f"{own.follower}/base_footprint",
-            pose=msg.PoseWithCovariance(pose=_ORIGIN, covariance=_UNKNOWN_COVARIANCE),
+            pose=msg.PoseWithCovariance(pose=pose, covariance=_UNKNOWN_COVARIANCE),
             twist=twist,
         )
         motions.append(_Input(own.odom, odometry, stamp_ns, record.log_ns))
     if not motions:
         raise UsageError(f"log {log.path}: topic {topic!r} has no odometry that can be read; correct the map")
     return motions
+
+
+def _is_missed(log: Log, chart: TopicMap) -> bool:
+    """Whether odometry that the log does not have is needed, or seems to be there under another name."""
+    poses = {chart.topics.leader_pose, chart.topics.follower_pose}
+    others = {name for name, typename in log.topics.items() if typename in _MOTIONS}
+    misnamed = chart.scenario.estimator.own_motion == "auto" and _bare(others) - poses
+    return needs_odometry(chart.scenario) or bool(misnamed)
 
 
 def _messages(log: Log, topic: str) -> Iterator[tuple[Record, msg.Message]]:
@@ -180,6 +192,10 @@ def _messages(log: Log, topic: str) -> Iterator[tuple[Record, msg.Message]]:
 
 def _stamp_ns(record: Record, given: msg.Header, chart: TopicMap) -> int:
     return record.log_ns if chart.topics.stamps == "log" else to_ns(given.stamp)
+
+
+def _bare(names: Iterable[str]) -> set[str]:
+    return {name.removeprefix("/") for name in names}
 
 
 def _present(log: Log, chart: TopicMap, name: str, accepted: tuple[str, ...]) -> str:

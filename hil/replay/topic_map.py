@@ -1,7 +1,8 @@
 """Topic maps: how a rosbag2 log from another lab names what the estimator reads.
 
 A map is a TOML file. ``[topics]`` names the topics, either ``rigid_bodies`` or ``leader_pose`` and
-``follower_pose``, and always ``odometry`` of the follower. ``[bodies]`` names the two bodies in the frames.
+``follower_pose``, and ``odometry`` of the follower, if there is any. ``[bodies]`` names the two bodies in the
+frames.
 ``[scenario]`` has a ``base`` (name or path) and what differs from it: noise, limits, front end.
 """
 
@@ -27,12 +28,13 @@ class TopicNames(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Topics of a foreign log, with or without their leading slash.
 
     ``rigid_bodies``: mocap frames, or ``leader_pose``, ``follower_pose``: PoseStamped or Odometry in one
-    world frame. ``odometry``: motion of the follower, Odometry or TwistStamped. ``stamps``: ``log`` takes the
+    world frame. ``odometry``: motion of the follower, Odometry or TwistStamped; without it the follower's own
+    poses tell its motion. ``stamps``: ``log`` takes the
     time of logging for the time of capture, where the stamps of the sources come from different clocks.
     ``pair_within_s``: how far apart in time two poses may be to make a frame.
     """
 
-    odometry: str
+    odometry: str | None = None
     rigid_bodies: str | None = None
     leader_pose: str | None = None
     follower_pose: str | None = None
@@ -90,6 +92,11 @@ def load_topic_map(
     if file.topics.rigid_bodies is not None and poses != (None, None):
         raise UsageError(f"{source}: topics: give either rigid_bodies or leader_pose and follower_pose")
     scenario = with_overrides(merged_scenario(file.scenario, path.stem, f"{source}: scenario"), *overrides)
+    if file.topics.odometry is None and needs_odometry(scenario):
+        raise UsageError(
+            f"{source}: topics.odometry is missing, and estimator.own_motion is "
+            f"{scenario.estimator.own_motion!r}; name the topic, or set own_motion to 'auto' or 'mocap'"
+        )
     refuse_chain(scenario, "a map names the topics of two robots; leave out what sets chain")
     return TopicMap(
         path=path,
@@ -100,10 +107,15 @@ def load_topic_map(
     )
 
 
+def needs_odometry(scenario: Scenario) -> bool:
+    """Whether nothing can be estimated without the follower's odometry."""
+    return scenario.estimator.own_motion not in ("auto", "mocap")
+
+
 def _without_slashes(names: TopicNames) -> TopicNames:
     return msgspec.structs.replace(
         names,
-        odometry=names.odometry.removeprefix("/"),
+        odometry=names.odometry and names.odometry.removeprefix("/"),
         rigid_bodies=names.rigid_bodies and names.rigid_bodies.removeprefix("/"),
         leader_pose=names.leader_pose and names.leader_pose.removeprefix("/"),
         follower_pose=names.follower_pose and names.follower_pose.removeprefix("/"),

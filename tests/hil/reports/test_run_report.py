@@ -144,7 +144,7 @@ def eventful(exact_run_data: RunData) -> str:
 
 def test_the_head_says_what_was_run_and_how_it_went(eventful: str) -> None:
     assert f"{EVIL} · ekf · seed 1 · lockstep" in words(eventful)
-    assert "✗ extended ones violated" in words(eventful)
+    assert "✗ by the largest errors seen: extended ones violated" in words(eventful)
     assert 'class="verdict bad"' in eventful
     assert "inputs refused: gated 1, swapped 2" in words(eventful)
 
