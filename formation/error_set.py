@@ -45,7 +45,7 @@ Curve = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True, slots=True)
 class ErrorSet:
-    """A proved set, and ``inward``: least speed of the field across it, in rho / rho_0 and alpha1 per second."""
+    """A proved set; ``inward``: least speed of the field across it, in rho / rho_0 and alpha1 a second."""
 
     inside: InvariantSet
     inward: float
@@ -54,7 +54,7 @@ class ErrorSet:
 def error_set(model: ErrorModel) -> ErrorSet | None:
     """The smallest set that is proved, or None if the outermost motion never closes.
 
-    Its boundary is crossed inwards by all motions of the model; rounding is a billionth of the speed at which.
+    All motions of the model cross its boundary inwards, a million times faster than rounding moves.
     """
     if not model.v1 > model.W:
         return None

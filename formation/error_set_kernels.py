@@ -45,7 +45,7 @@ class Half(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """A state as its disc is looked at: true velocity along and across the line, distance, f, and the side."""
+    """A state as its disc is looked at: side, true velocity along and across the line, rho, f(rho)."""
 
     side: float
     x: float
@@ -139,7 +139,7 @@ def _step(model: ErrorModel, rho: float, rate: float, push: float) -> float:
 def outermost_half(
     rhos: Vector, psis: Vector, rho: float, side: float, spare: float, model: ErrorModel
 ) -> int:
-    """Outermost motion from (rho, 0) until psi is back at 0, disturbed by ``spare`` [rad/s] more than allowed.
+    """Outermost motion from (rho, 0) until psi is back at 0, disturbed by ``spare`` [rad/s] too much.
 
     It begins upright, as far as psi = 1e-3, and ends along its last direction, both a little outside of the
     motion. Returns the number of points, or ``ESCAPED``.
@@ -166,7 +166,7 @@ def outermost_half(
 
 @kernel
 def _outward(model: ErrorModel, side: float, a: Half, b: Half) -> float:
-    """Upper bound of the field's outward speed on the piece from a to b, in rho / rho_0 and alpha1 per second.
+    """Upper bound of the field's outward speed on the piece from a to b, in rho / rho_0 and alpha1 a second.
 
     -inf for a piece that is upright: there rho_dot alone matters, whose sign is that of the half.
     """

@@ -111,7 +111,7 @@ def _sources(given: Assumptions) -> tuple[str, ...]:
         f"v1 <= k_v = {given.k_v:g} m/s at constant speed and |u1| <= k_u = {given.k_u:g} rad/s, "
         f"so that the leader accelerates by at most {given.acceleration:.3g} m/s^2",
         f"a measurement every {1e3 * given.step:.3g} ms over the window, none missing",
-        "a plain difference over the best window; a Kalman filter errs less on the whole, and more at its worst",
+        "a plain difference over the best window; a Kalman filter errs less as a rule, more at its worst",
     )
 
 
@@ -237,7 +237,7 @@ def _formation_any_speed(given: Assumptions, system: Disturbed) -> Claim:
 def _formation_with_errors(
     given: Assumptions, velocity_error: float, system: Disturbed, held: InvariantSet | None
 ) -> Claim:
-    """The set under one wrong velocity in all terms at once; by the bound of h where the leader's speed varies.
+    """The set under one wrong velocity in all terms at once; by the bound of h where v1 varies.
 
     alpha2 is at rest in it. ``assumes`` tells how far the same error moves it.
     """
@@ -251,8 +251,8 @@ def _formation_with_errors(
     )
     if found is None:
         why = (
-            f"the worst steering within {given.k_u:g} rad/s with the worst belief within {velocity_error:.3g} "
-            "m/s carries alpha1 past its saddle, or the robots apart"
+            f"the worst steering within {given.k_u:g} rad/s with the worst belief within "
+            f"{velocity_error:.3g} m/s carries alpha1 past its saddle, or the robots apart"
         )
         return Claim({}, _formation(given, system, None, besides).assumes, why)
     assumes = (

@@ -84,7 +84,7 @@ def parity_line(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
 
 
 def _estimate_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
-    estimation, bounds = summary["estimation"], summary["bounds"]
+    estimation = summary["estimation"]
     rmse = estimation.get("rmse", {})
     parts = []
     if "v1" in rmse:

@@ -30,8 +30,8 @@ class AssumedErrors(NamedTuple):
     """Error bounds taken for granted where the truth is not known: three standard deviations of each input.
 
     ``rate`` [m/s] is the guaranteed error of the leader's velocity by noise and acceleration bounds.
-    ``positions``: of the mocap frame; ``in_world``: whether the leader is tracked there, so that v1 and alpha1
-    rest on these alone.
+    ``positions``: of the mocap frame; ``in_world``: whether the leader is tracked there, so that v1 and
+    alpha1 rest on these alone.
     """
 
     rate: float
