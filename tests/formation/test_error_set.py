@@ -44,7 +44,7 @@ def test_the_robot_experiment_with_wrong_estimates_keeps_its_distance() -> None:
     assert 0.11 <= held.inside.rho_min < held.inside.rho_max <= 0.45
 
 
-@pytest.mark.parametrize("error", [0.01, 0.0205])
+@pytest.mark.parametrize("error", [0.01, 0.018])
 def test_the_worst_motion_by_another_integrator_comes_near_the_edge_from_within(error: float) -> None:
     """scipy on the rates of the paper, the worst of a fine grid of errors taken at every moment."""
     model = TURTLEBOT3._replace(W=error)
@@ -63,9 +63,9 @@ def test_the_worst_motion_by_another_integrator_comes_near_the_edge_from_within(
     inside = found(model).inside
     rho, theta = np.concatenate([first, second], axis=1)
     assert np.all(inside.contains(rho, theta + ABREAST_ALPHA1, 1e-6))
-    assert rho.min() < inside.rho_min + 0.003
-    assert rho.max() > inside.rho_max - 0.006
-    assert theta.max() > inside.alpha1_max - ABREAST_ALPHA1 - 0.06
+    assert rho.min() < inside.rho_min + 0.002
+    assert rho.max() > inside.rho_max - 0.002
+    assert theta.max() > inside.alpha1_max - ABREAST_ALPHA1 - 0.2
 
 
 def test_no_admitted_motion_points_out_of_the_polygon() -> None:
