@@ -170,10 +170,12 @@ def along_own_axes(belief: Gaussian, measurement: Measurement, jump: JumpUncerta
     Noise and jump act alike: on the leader's place in every direction, and by the own heading on everything.
     """
     b = belief
+    noise = measurement.noise
     if measurement.in_world:
-        pose, noise = measurement.seen.follower, measurement.noise
+        pose = measurement.seen.follower
         c, s = math.cos(pose.theta), math.sin(pose.theta)
         b = turned(b._replace(x=b.x - pose.x, y=b.y - pose.y), c, s)
+    if measurement.in_world or measurement.anchored:
         b = _blurred(b, noise.position * noise.position, noise.heading * noise.heading)
     return _blurred(b, jump.position * jump.position, jump.heading * jump.heading)
 

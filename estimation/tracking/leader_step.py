@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from estimation.filters.filter import Filter, Stepped
 from estimation.filters.gaussian import nis_of
-from estimation.models.coordinated_turn import mean_motion
+from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import Measurement
 from estimation.tracking.manoeuvre import Manoeuvre, later, noticed, raised
 from estimation.tracking.track_point import TrackPoint
@@ -24,20 +24,24 @@ class Followed(NamedTuple):
 
 @kernel
 def followed_leader(
-    last: TrackPoint, measurement: Measurement, gate: float, notices: bool, estimator: Filter
+    last: TrackPoint,
+    measurement: Measurement,
+    way: FollowerMotion,
+    gate: float,
+    notices: bool,
+    estimator: Filter,
 ) -> Followed:
     """Belief of a point moved on to a measurement, and with that taken in unless its NIS is above ``gate``.
 
-    ``notices``: whether process noise is raised for a leader that changes its motion at once. What a frame
+    ``way``: the follower's mean motion in between. ``notices``: whether process noise is raised for a leader that changes its motion at once. What a frame
     check has refused, by a negative gate, says nothing of manoeuvres.
     """
     dt = (measurement.capture_ns - last.measurement.capture_ns) * _NS
-    motion = mean_motion(last.measurement.motion, measurement.motion)
     if not notices:
-        return Followed(estimator.step(last.belief, dt, motion, measurement, gate), last.manoeuvre)
+        return Followed(estimator.step(last.belief, dt, way, measurement, gate), last.manoeuvre)
     manoeuvre = later(last.manoeuvre, dt)
     noise = raised(estimator.noise, manoeuvre, estimator.limits)
-    prior = estimator.driven_by(noise).predict(last.belief, dt, motion)
+    prior = estimator.driven_by(noise).predict(last.belief, dt, way)
     if gate > 0.0:
         seen = noticed(manoeuvre, prior, measurement, noise, estimator.limits)
         prior, manoeuvre = seen.belief, seen.manoeuvre

@@ -38,13 +38,17 @@ from estimation.tracking.track_point import (
     JumpUncertainty,
     TrackPoint,
     begun,
+    next_period,
     no_tentative,
+    way_to,
 )
 from formation.kernel import kernel
 from formation.records import Rows, load, size, store
 from formation.ring import Ring, place
 
 _NS = 1e-9
+_COASTS, _LOST = 2.5, 8.0  # typical intervals without a measurement: coasting, lost
+_SLOWEST = 2.0  # [s] between measurements; what is slower is no track
 
 
 class Status(IntEnum):
@@ -74,7 +78,7 @@ class TrackSettings(NamedTuple):
 
     gate_probability: share of good measurements that pass a chi-square gate.
     reacquire_frames: rejected measurements that must agree with each other before they take over.
-    coast_after, lost_after, window: [s]. jump_uncertain_for: how long [s] a jump stays uncertain.
+    coast_after, lost_after, window: [s]; a track of slow measurements has some of their intervals. jump_uncertain_for: how long [s] a jump stays uncertain.
     settled_heading, unsettled_heading: standard deviation of the leader's direction [rad] below which a track
     settles, and above which it no longer counts as settled.
     capped_speed: whether a leader that seems faster than k_v settles as one of k_v would.
@@ -127,14 +131,20 @@ def is_settled(belief: Gaussian, before: bool, settings: TrackSettings, limits: 
 
 
 @kernel
+def lost_after(point: TrackPoint, settings: TrackSettings) -> float:
+    """Silence [s] after which a track is lost: what is told, or some of its own typical intervals."""
+    return max(settings.lost_after, _LOST * point.period)
+
+
+@kernel
 def status_of(point: TrackPoint, now_ns: int, settings: TrackSettings) -> int:
     """Status of a track's newest point for one who looks at it at ``now_ns``."""
     silence = (now_ns - point.used_ns) * _NS
-    if silence > settings.lost_after:
+    if silence > lost_after(point, settings):
         return LOST
     if point.verdict == GATED:
         return REJECTING
-    if silence > settings.coast_after:
+    if silence > max(settings.coast_after, _COASTS * point.period):
         return COASTING
     return TRACKING if point.settled else INITIALISING
 
@@ -151,11 +161,13 @@ def follow(
     """
     capture_ns, full_gate = measurement.capture_ns, gate_of(settings)
     found = _checked(last, measurement, full_gate, estimator)
-    if (capture_ns - last.used_ns) * _NS > settings.lost_after:
+    if (capture_ns - last.used_ns) * _NS > lost_after(last, settings):
         return _found(last, measurement, found, settings, estimator)
     # Nothing passes a negative gate: the belief is then the prediction.
     gate = full_gate if found.cause == BELIEVED else -1.0
-    followed = followed_leader(last, measurement, gate, settings.notices_manoeuvres, estimator)
+    dt = (capture_ns - last.measurement.capture_ns) * _NS
+    way = way_to(last, measurement, found.cause == BELIEVED, dt)
+    followed = followed_leader(last, measurement, way, gate, settings.notices_manoeuvres, estimator)
     stepped = followed.stepped
     point = TrackPoint(
         measurement,
@@ -163,13 +175,16 @@ def follow(
         USED,
         stepped.nis,
         capture_ns,
-        is_settled(stepped.belief, last.settled, settings, estimator.limits),
+        is_settled(estimator.leader(stepped.belief, measurement), last.settled, settings, estimator.limits),
         no_tentative(stepped.belief),
         found.check,
         BELIEVED,
         _lasting(last.jump, capture_ns, settings),
         estimator.noise,
         followed.manoeuvre,
+        next_period(last.period, dt),
+        way,
+        dt,
     )
     if stepped.nis <= gate:
         return point
@@ -215,11 +230,14 @@ def _found(
             check=found.check,
             cause=found.cause,
         )
-    anew = begun(measurement, estimator)
+    # One that was lost for being slow is to be given the time that it takes.
+    apart = (measurement.capture_ns - last.measurement.capture_ns) * _NS
+    anew = begun(measurement, estimator)._replace(period=min(_SLOWEST, next_period(last.period, apart)))
     tentative = joined(last.tentative, measurement, estimator, gate_of(settings))
     if tentative.frames < settings.reacquire_frames:
         return anew._replace(tentative=tentative)
-    settled = is_settled(tentative.belief, False, settings, estimator.limits)
+    leader = estimator.leader(tentative.belief, measurement)
+    settled = is_settled(leader, False, settings, estimator.limits)
     return anew._replace(belief=tentative.belief, settled=settled)
 
 
@@ -234,17 +252,17 @@ def _taken_over(rejected: TrackPoint, settings: TrackSettings, estimator: Filter
     if tentative.frames < settings.reacquire_frames:
         return rejected
     prior, leader_fits = rejected.belief, rejected.nis <= gate_of(settings)
-    shown = estimator.shown(prior, measurement)
-    jump = jumped(rejected.jump, measurement, shown, rejected.check, leader_fits)
+    jump = jumped(rejected.jump, measurement, prior, rejected.check, leader_fits)
     if line_turn(jump, measurement) > settings.followed_turn:
         return rejected
     belief = estimator.update(prior, measurement) if leader_fits else tentative.belief
     check = check_from(measurement) if measurement.framed else rejected.check
+    leader = estimator.leader(belief, measurement)
     return rejected._replace(
         belief=belief,
         verdict=RESTARTED,
         used_ns=measurement.capture_ns,
-        settled=is_settled(belief, leader_fits and rejected.settled, settings, estimator.limits),
+        settled=is_settled(leader, leader_fits and rejected.settled, settings, estimator.limits),
         tentative=no_tentative(belief),
         check=check,
         cause=BELIEVED,

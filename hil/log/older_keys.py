@@ -11,6 +11,9 @@ from copy import deepcopy
 from typing import Any
 
 BEFORE: dict[str, Any] = {
+    "estimator.slip_v2": 0.0,
+    "estimator.slip_u2": 0.0,
+    "estimator.settled_heading": 0.0,
     "estimator.noise": "given",
     "controller.mount_check": "warn",
     "leader.mount": [0.0, 0.0, 0.0],

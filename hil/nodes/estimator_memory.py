@@ -65,7 +65,7 @@ from hil.wire.writing import MOST_RECEIPTS
 if TYPE_CHECKING:
     from hil.nodes.estimator_entries import Steps
 
-HISTORY = 2.0
+HISTORY = 4.0
 """Seconds of odometry kept, enough for the latest frame that the ring can take."""
 
 WAYS = 64

@@ -31,9 +31,11 @@ from estimation.models.measurement import (
     Measurement,
     PairSeen,
     PoseNoise,
+    measure_body_anchored,
     measure_body_from_mocap,
     measure_world,
 )
+from estimation.own_motion.interval_motion import motion_between
 from estimation.own_motion.judged_odometry import age_of, aged, fresh_for, is_better, with_own_track
 from estimation.own_motion.odometry_check import (
     POSE,
@@ -333,7 +335,25 @@ def measured(rules: Rules, capture_ns: int, seen: PairSeen, motion: FollowerMoti
     leader = (seen.leader_x, seen.leader_y)
     if rules.filter.in_world:
         return measure_world(capture_ns, leader, seen.follower, rules.noise, motion)
+    if rules.source == MOCAP:
+        return measure_body_anchored(capture_ns, leader, seen.follower, rules.noise, motion)
     return measure_body_from_mocap(capture_ns, leader, seen.follower, rules.noise, motion)
+
+
+@kernel
+def _with_way(known: Known, memory: Memory, rules: Rules, measurement: Measurement, k: int) -> Measurement:
+    """Measurement, the track's k-th, with the way by odometry since the one before, where that counts."""
+    if rules.filter.in_world or measurement.anchored or k == 0 or known.odometry.length == 0:
+        return measurement
+    to_ns = measurement.capture_ns
+    if measurement.framed and rules.source != ODOMETRY:
+        if rules.source != AUTO or not _is_fresh(known, rules, to_ns):
+            return measurement._replace(has_way=False)
+    from_ns = capture_at(memory.points, known.track, k - 1)
+    if from_ns >= to_ns:
+        return measurement
+    way = motion_between(memory.history, known.odometry, (from_ns, to_ns), rules.trust, known.correction)
+    return measurement._replace(has_way=True, way=way)
 
 
 @kernel
@@ -341,18 +361,32 @@ def take(known: Known, memory: Memory, rules: Rules, measurement: Measurement) -
     """Take in a measurement of the leader."""
     points, ring = memory.points, known.track
     late = ring.length > 0 and measurement.capture_ns < capture_at(points, ring, ring.length - 1)
+    before = place_of(points, ring, measurement.capture_ns)
+    measurement = _with_way(known, memory, rules, measurement, before)
     learning, estimator = rules.process_learning, rules.filter
     if learning.on:
         estimator = estimator.driven_by(learned_noise(known.process, learning))
     added = add(points, ring, measurement, rules.settings, estimator)
     cause = added.cause if added.verdict == GATED else BELIEVED
     known = known._replace(track=added.ring)
+    if late and measurement.has_way and added.verdict != DUPLICATE and added.verdict != LATE:
+        _shorten_way(known, memory, rules, measurement.capture_ns)
     if learning.on and not late:
         known = known._replace(process=_learned(known, memory, rules, added.verdict))
     if rules.filter.in_world and not late:
         point, settings = newest(points, added.ring), rules.settings
         known = known._replace(travel=watched(known.travel, point, settings.lost_after, rules.filter.limits))
     return Taken(known, added.verdict, cause, late)
+
+
+@kernel
+def _shorten_way(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> None:
+    """Give what comes after a measurement that came late its way since that one."""
+    points, ring = memory.points, known.track
+    k = place_of(points, ring, capture_ns) + 1
+    after = _with_way(known, memory, rules, point_at(points, ring, k).measurement, k)
+    if _put_measurement(known, memory, k, after):
+        reprocessed(points, ring, k, rules.settings, rules.filter)
 
 
 @kernel
@@ -363,15 +397,7 @@ def _learned(known: Known, memory: Memory, rules: Rules, verdict: int) -> Learne
     if verdict != USED:
         return known.process
     point = newest(memory.points, known.track)
-    return learn(
-        known.process,
-        memory.bank,
-        point.measurement,
-        point.belief,
-        point.settled,
-        rules.process_learning,
-        rules.filter,
-    )
+    return learn(known.process, memory.bank, point, rules.process_learning, rules.filter)
 
 
 @kernel
@@ -421,7 +447,9 @@ def _with_odometry(known: Known, memory: Memory, rules: Rules, first: int) -> bo
             motion = by_either_at(known, memory, rules, capture_ns)
         else:
             motion = by_odometry(known, memory, rules, capture_ns)
-        changed = _put_motion(known, memory, k, point, motion) or changed
+        measurement = with_motion(point, motion).measurement
+        measurement = _with_way(known, memory, rules, measurement, k)
+        changed = _put_measurement(known, memory, k, measurement) or changed
     return changed
 
 
@@ -445,16 +473,24 @@ def _with_own_motion(known: Known, memory: Memory, rules: Rules, first: int) -> 
 
 @kernel
 def _put_motion(known: Known, memory: Memory, k: int, point: TrackPoint, motion: FollowerMotion) -> bool:
-    was = point.measurement.motion
-    same = (
-        was.v2 == motion.v2
-        and was.u2 == motion.u2
-        and was.sd_v2 == motion.sd_v2
-        and was.sd_u2 == motion.sd_u2
-    )
+    return _put_measurement(known, memory, k, with_motion(point, motion).measurement)
+
+
+@kernel
+def _put_measurement(known: Known, memory: Memory, k: int, measurement: Measurement) -> bool:
+    """Put another motion and way of the follower in at a point; whether they are other ones."""
+    point = point_at(memory.points, known.track, k)
+    was = point.measurement
+    same = _same_motion(was.motion, measurement.motion) and _same_motion(was.way, measurement.way)
+    same = same and was.has_way == measurement.has_way
     if not same:
-        store(memory.points, place(known.track, memory.points, k), with_motion(point, motion))
+        store(memory.points, place(known.track, memory.points, k), point._replace(measurement=measurement))
     return not same
+
+
+@kernel
+def _same_motion(a: FollowerMotion, b: FollowerMotion) -> bool:
+    return a.v2 == b.v2 and a.u2 == b.u2 and a.sd_v2 == b.sd_v2 and a.sd_u2 == b.sd_u2
 
 
 @kernel
@@ -483,5 +519,6 @@ def is_under_way(known: Known, rules: Rules) -> bool:
 def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) -> Told:
     """Newest estimate of a track that has one, its status as seen at ``now_ns``."""
     point = newest(points, known.track)
+    point = point._replace(belief=rules.filter.leader(point.belief, point.measurement))
     told = estimate_at(point, status_of(point, now_ns, rules.settings))
     return Told(guessed_when_slow(told, rules.filter.limits.v_eps), point.cause)

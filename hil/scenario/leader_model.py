@@ -93,7 +93,7 @@ def leader_lever(scenario: Scenario) -> Lever:
 def refuse_leader_lever(scenario: Scenario) -> None:
     """Raise :class:`UsageError` for a leader's body off its wheel axis where the estimator knows none."""
     given, lever = scenario.estimator, leader_lever(scenario)
-    if lever.is_none():
+    if lever.vanishes():
         return
     without = given.kind not in ("ekf", "ukf") or given.bias_states or given.certify
     if without:
@@ -116,7 +116,10 @@ def refuse_bias_states(scenario: Scenario) -> None:
 
 def track_settings(scenario: Scenario) -> TrackSettings:
     """When a measurement is believed, and when the estimate."""
-    given = scenario.estimator
+    given, settled = scenario.estimator, settling(scenario.estimator.kind)
+    if given.settled_heading > 0.0:
+        least = float(given.settled_heading)
+        settled = settled._replace(settled_heading=least, unsettled_heading=least + 0.25)
     return TrackSettings(
         gate_probability=given.gate_probability,
         reacquire_frames=given.reacquire_frames,
@@ -124,7 +127,7 @@ def track_settings(scenario: Scenario) -> TrackSettings:
         lost_after=float(given.lost_after_s),
         window=float(given.window_s),
         notices_manoeuvres=finds_process_noise(scenario),
-        **settling(given.kind)._asdict(),
+        **settled._asdict(),
     )
 
 
@@ -157,5 +160,7 @@ def input_trust(scenario: Scenario) -> InputTrust:
         given.input_lag_s,
         limits.v_max,
         limits.u_max,
+        given.slip_v2 if given.front_end == "body" else 0.0,
+        given.slip_u2 if given.front_end == "body" else 0.0,
     )
     return InputTrust(*map(float, numbers))

@@ -257,9 +257,12 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``stamp_offset_s``: by how much trusted stamps are later than the robot's clock was at the capture.
     ``speed_bandwidth``: q_v = speed_bandwidth * k_v^2 per second (0.01 for leaders that drive evenly, 0.1
     for those that stop and go every few seconds).
-    ``process_noise``: estimated finds both bandwidths by what is seen of the leader, from the given ones on, and
-    notices steps of its speed and turn rate (``ekf``, ``ukf``); given takes them as they are.
+    ``process_noise``: estimated finds both bandwidths by what is seen of the leader, from the given ones on,
+    and notices steps of its speed and turn rate (``ekf``, ``ukf``); given takes them as they are.
     ``align_odometry``: odometry is corrected by the delay and scales that the follower's mocap track shows.
+    ``slip_v2``, ``slip_u2``: share of v2 and u2 by which slip may falsify odometry; on the body front end.
+    ``settled_heading``: standard deviation [rad] of the leader's direction from which on a track is trusted
+    with it, until it is 0.25 rad above that; 0 for what suits the estimator (0.35 for most).
     ``certify``: publish a guaranteed error radius of v1 and alpha1 beside every estimate.
     ``kind`` smoother is for replays only; an estimator of one's own is ``file.py:factory`` or
     ``package.module:factory``.
@@ -288,6 +291,9 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     sigma_u2: Positive = 0.03
     input_delay_s: NonNegative = 0.0
     input_lag_s: NonNegative = 0.0
+    slip_v2: NonNegative = 0.1
+    slip_u2: NonNegative = 0.1
+    settled_heading: NonNegative = 0.0
     turn_bandwidth: Positive = 0.5
     speed_bandwidth: Positive = 0.01
     process_noise: ProcessNoiseSource = "estimated"

@@ -242,3 +242,16 @@ def test_a_topic_that_holds_rubbish_only_is_named(topic: str, said: str, tmp_pat
             out.write(each.topic, typename_of(each.message), payload, each.log_ns, each.log_ns)
     with pytest.raises(UsageError, match=said):
         replay_foreign(read_log(tmp_path / "bad.mcap"), load_topic_map(str(chart(tmp_path, POSES))))
+
+
+@pytest.mark.parametrize("named", [True, False])
+@pytest.mark.parametrize("source", ["auto", "mocap"])
+def test_a_bag_without_odometry_gives_the_leaders_motion_all_the_same(
+    named: bool, source: str, tmp_path: Path
+) -> None:
+    log = bag(tmp_path, [each for each in lab() if each.topic not in ("/tb2/odom", "/tb2/twist")])
+    text = POSES if named else POSES.replace('odometry = "/tb2/odom"', "")
+    played = replay_foreign(
+        log, load_topic_map(str(chart(tmp_path, text)), None, None, [f"estimator.own_motion={source}"])
+    )
+    assert played.estimates[-1].v1 == pytest.approx(V1, abs=0.01)
