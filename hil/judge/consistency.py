@@ -15,8 +15,8 @@ TOLERATED = (0.5, 2.0)
 """Nobody minds deviations that are off by a factor of 1.4, however surely that is known."""
 
 LEAST_EXPLAINED = 0.9
-"""Of sound errors 99.7 % lie within three deviations; that a tenth lies outside happens in 1 of 37 runs at most,
-however alike the errors are (Markov's inequality)."""
+"""Of sound errors 99.7 % lie within three deviations; that a tenth lies outside happens in 1 of 37 runs at
+most, however alike the errors are (Markov's inequality)."""
 
 _EXACT = 1e-12
 """Who errs by a millionth of his deviations was given the truth, and what is left is rounding."""
