@@ -81,10 +81,8 @@ class Filter(NamedTuple):
     def predict(self, belief: Gaussian, dt: float, follower: FollowerMotion) -> Gaussian:
         """Belief after dt [s], the follower having moved as given."""
         noise = self.noise if self.in_world else standing_noise(belief, self.noise)
-        if self.kind == UKF:
-            ahead = unscented_moved(belief, dt, noise)
-        else:
-            ahead = extended_moved(belief, dt, noise)
+        unscented = self.kind == UKF
+        ahead = unscented_moved(belief, dt, noise) if unscented else extended_moved(belief, dt, noise)
         if not is_centred(self.lever):
             ahead = swung(ahead, belief, self.lever, self.limits.v_eps, noise.q_u, dt)
         if self.kind == DIFFERENCE:
