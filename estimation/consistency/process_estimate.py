@@ -40,7 +40,7 @@ errors larger than reported by a tenth; for those that steer smoothly what is re
 """
 
 _TOLD_SD = math.log(10.0)  # what is told is known to a factor of ten
-_FALLING = 0.75  # [1/s]: calm leaders are believed to be calm after they have been so for a while
+_SPEED_FALLING, _TURN_FALLING = 0.75, 0.25  # [1/s]: who drives calmly for a while need not be calm
 _INTERVAL_NS = 30_000_000
 _SETTLING_NS = 500_000_000
 _LARGEST_NIS = 400.0  # a member further off starts again from the main filter
@@ -261,8 +261,10 @@ def _score(
 def _taken(bank: Rows[Member], told: float, before: float, dt: float, turn: bool) -> float:
     """Ratio to the told bandwidth to go on with: the likeliest, but no faster down than leaders may calm."""
     first, count, lowest, ratio = TURN_MEMBERS, SPEED_MEMBERS, SPEED_LOWEST, SPEED_RATIO
+    falling = _SPEED_FALLING
     if turn:
         first, count, lowest, ratio = 0, TURN_MEMBERS, TURN_LOWEST, TURN_RATIO
+        falling = _TURN_FALLING
     lowest, step = math.log(lowest / told), math.log(ratio)
     best, highest = 0, _posterior(bank, first, lowest)
     for k in range(1, count):
@@ -274,7 +276,7 @@ def _taken(bank: Rows[Member], told: float, before: float, dt: float, turn: bool
         below = highest - _posterior(bank, first + best - 1, off - step)
         above = highest - _posterior(bank, first + best + 1, off + step)
         off += _vertex(below, above, step)
-    return max(SHARE * math.exp(off), before * math.exp(-_FALLING * dt))
+    return max(SHARE * math.exp(off), before * math.exp(-falling * dt))
 
 
 @kernel

@@ -20,8 +20,8 @@ from formation.kernel import kernel
 LARGEST_SHARE = 3.0
 """Standard deviations that an innovation counts for at most: two gated outliers in a row are no run."""
 
-ALARM = 8.0
-"""Logarithm [nat] of how much likelier a run must be than chance: 1 false alarm in some 3,000 innovations."""
+ALARM = 9.0
+"""Logarithm [nat] of how much likelier a run must be than chance: one in many thousand innovations is false."""
 
 LASTS = 0.15
 """How long [s] the noise stays raised after an alarm: about as long as a robot's actuators take."""
@@ -32,8 +32,11 @@ REMEMBERED = 30.0
 SPEED_RAISED, TURN_RAISED = 0.3, 1.0
 """Bandwidths that the noise is raised to: a step of half of what a leader can do, every second or so."""
 
-SPEED_WIDER, TURN_WIDER = 2.0, 3.0
-"""How much larger noise is to be for a leader that makes jumps: noise of the same power has no such tails."""
+SPEED_JUMPY, TURN_JUMPY = 0.1, 0.5
+"""Bandwidths of a leader that turns, stops and goes as it likes, and is found to: what its motion comes to on
+average has no such tails as its jumps have."""
+
+_SURE = 0.5  # share that one alarm adds to how sure it is that a leader makes jumps
 
 _LEAST_SPEED = 1e-9
 
@@ -43,7 +46,7 @@ class Manoeuvre(NamedTuple):
 
     ahead, behind, left, right: likelihood ratios [nat] of a run to that side. running: for how long [s] the
     one along has grown. speed_raised, turn_raised: how long [s] noise is to stay raised. speed_jumps,
-    turn_jumps: 1 at an alarm, and forgotten since.
+    turn_jumps: how sure it is, up to 1, that the leader makes jumps; a single alarm may be chance.
     """
 
     ahead: float
@@ -86,13 +89,13 @@ def later(manoeuvre: Manoeuvre, dt: float) -> Manoeuvre:
 @kernel
 def raised(noise: ProcessNoise, manoeuvre: Manoeuvre, limits: LeaderLimits) -> ProcessNoise:
     """Process noise of a leader that makes jumps, or just now seems to."""
-    q_v = noise.q_v * (1.0 + (SPEED_WIDER - 1.0) * manoeuvre.speed_jumps)
-    q_u = noise.q_u * (1.0 + (TURN_WIDER - 1.0) * manoeuvre.turn_jumps)
+    speed, turn = SPEED_JUMPY * manoeuvre.speed_jumps, TURN_JUMPY * manoeuvre.turn_jumps
     if manoeuvre.speed_raised > 0.0:
-        q_v = max(q_v, SPEED_RAISED * limits.k_v * limits.k_v)
+        speed = SPEED_RAISED
     if manoeuvre.turn_raised > 0.0:
-        q_u = max(q_u, TURN_RAISED * limits.k_u * limits.k_u)
-    return noise._replace(q_v=q_v, q_u=q_u)
+        turn = TURN_RAISED
+    q_v = max(noise.q_v, speed * limits.k_v * limits.k_v)
+    return noise._replace(q_v=q_v, q_u=max(noise.q_u, turn * limits.k_u * limits.k_u))
 
 
 @kernel
@@ -130,9 +133,11 @@ def noticed(
                 vx_vy=prior.vx_vy + ex * ey * lacking,
                 vy_vy=prior.vy_vy + ey * ey * lacking,
             )
-        after = after._replace(ahead=0.0, behind=0.0, running=0.0, speed_raised=LASTS, speed_jumps=1.0)
+        jumps = min(1.0, manoeuvre.speed_jumps + _SURE)
+        after = after._replace(ahead=0.0, behind=0.0, running=0.0, speed_raised=LASTS, speed_jumps=jumps)
     if max(left, right) > ALARM:
-        after = after._replace(left=0.0, right=0.0, turn_raised=LASTS, turn_jumps=1.0)
+        jumps = min(1.0, manoeuvre.turn_jumps + _SURE)
+        after = after._replace(left=0.0, right=0.0, turn_raised=LASTS, turn_jumps=jumps)
     return Noticed(after, belief)
 
 

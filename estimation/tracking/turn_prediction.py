@@ -143,11 +143,18 @@ class TurnPrediction(NamedTuple):
 
 @kernel
 def held(turn_prediction: TurnPrediction, variance: float, ahead: float) -> float:
-    """Variance V [rad^2/s^2] of an estimate of u1 that is held for ``ahead`` [s]."""
-    return variance + turn_prediction.diffusion * ahead
+    """Variance V [rad^2/s^2] of an estimate of u1 that is held for ``ahead`` [s].
+
+    An inferred diffusion is that of the time P / q which the filter lags by. Steering is smooth, so that over
+    a longer time D it moves on by the square of it: V = P (D / (P / q))^2 in the place of q D.
+    """
+    walked = variance + turn_prediction.diffusion * ahead
+    if turn_prediction.inferred and variance > 0.0:
+        return walked * walked / variance
+    return walked
 
 
 @kernel
 def behind(turn_prediction: TurnPrediction, variance: float, ahead: float) -> float:
     """Time D [s] by which it is behind then."""
-    return held(turn_prediction, variance, ahead) / turn_prediction.diffusion
+    return (variance + turn_prediction.diffusion * ahead) / turn_prediction.diffusion

@@ -17,6 +17,8 @@ from estimation.tracking.manoeuvre import (
     LARGEST_SHARE,
     LASTS,
     REMEMBERED,
+    SPEED_JUMPY,
+    TURN_JUMPY,
     Manoeuvre,
     later,
     noticed,
@@ -57,10 +59,10 @@ def after(innovations: list[tuple[float, float]], heading: float = 0.3) -> tuple
 def test_a_run_along_raises_the_noise_of_the_speed_and_one_across_that_of_the_turning(
     heading: float, side: float
 ) -> None:
-    along, wider = after([(2.0 * side, 0.0)] * 6, heading)
-    assert (along.speed_raised, along.speed_jumps, along.turn_raised) == (LASTS, 1.0, 0.0)
-    across, same = after([(0.0, 2.0 * side)] * 6, heading)
-    assert (across.turn_raised, across.turn_jumps, across.speed_raised) == (LASTS, 1.0, 0.0)
+    along, wider = after([(2.0 * side, 0.0)] * 7, heading)
+    assert (along.speed_raised, along.speed_jumps, along.turn_raised) == (LASTS, 0.5, 0.0)
+    across, same = after([(0.0, 2.0 * side)] * 7, heading)
+    assert (across.turn_raised, across.turn_jumps, across.speed_raised) == (LASTS, 0.5, 0.0)
     assert same == prior(heading)
     noise = raised(NOISE, along, LIMITS)
     assert noise.q_v > 100.0 * NOISE.q_v
@@ -91,10 +93,12 @@ def test_noise_hardly_ever_makes_an_alarm() -> None:
 
 
 def test_what_is_raised_falls_back_and_that_a_leader_jumps_is_forgotten_slowly() -> None:
-    manoeuvre, _ = after([(2.0, 2.0)] * 6)
+    manoeuvre, _ = after([(2.0, 2.0)] * 7)
     soon, late = later(manoeuvre, 1.5 * LASTS), later(manoeuvre, REMEMBERED)
     assert (soon.speed_raised, soon.turn_raised) == (0.0, 0.0)
-    assert NOISE.q_v < raised(NOISE, soon, LIMITS).q_v < 2.1 * NOISE.q_v
+    jumpy = ProcessNoise.by_rule(LIMITS, 0.5 * TURN_JUMPY, 0.5 * SPEED_JUMPY)
+    assert raised(NOISE, soon, LIMITS).q_v == pytest.approx(jumpy.q_v, rel=0.02)
+    assert raised(NOISE, soon, LIMITS).q_u == pytest.approx(jumpy.q_u, rel=0.02)
     assert raised(NOISE, late, LIMITS) == NOISE
     assert raised(NOISE, steady(), LIMITS) == NOISE
 
