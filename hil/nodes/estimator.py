@@ -248,9 +248,9 @@ class EstimatorNode:
         A replay in one pass asks too, and has loaded none of the node's own steps.
         """
         known, rules = state.memory.known, self.rules.step
-        found = mount_findings(known.mount_check) | odometry_findings(known, rules, now_ns)
+        found = {**mount_findings(known.mount_check), **odometry_findings(known, rules, now_ns)}
         found |= noise_findings(known.noise, rules.noise_learning)
-        return found | leader_findings(known.travel, now_ns)
+        return {**found, **leader_findings(known.travel, now_ns)}
 
     def _missing(self, known: Known) -> str:
         """What the estimator waits for to begin."""
