@@ -268,7 +268,7 @@ def _regression(t: FloatArray, seen: FloatArray, rows: _Rows) -> _Fit | None:
 
 
 def _lasting_variance(rest: FloatArray, blocks: NDArray[np.int64]) -> float:
-    """Variance that residuals which were independent would have for sums over blocks to scatter as they do."""
+    """Variance of independent residuals whose sums over blocks would scatter as these do."""
     sums = np.bincount(blocks, rest)
     return max(float(sums @ sums) / len(rest), float(rest @ rest) / len(rest))
 

@@ -66,7 +66,7 @@ def smoothed_motion(
 def fitted_rates(
     t: FloatArray, poses: FloatArray, fit: LocalFit
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Times (m,) [s] on an even grid, the track fitted there (m, 3), headings unwrapped, and its rates (m, 3).
+    """Times (m,) [s] on an even grid, the track fitted there, headings unwrapped, and its rates (m, 3).
 
     ``t`` (n,) [s], increasing; ``poses`` (n, 3). NaN where it is not known.
     """

@@ -33,12 +33,22 @@ Floats = NDArray[np.float64]
 
 
 def normalised(error: Floats, sd: Floats) -> Floats:
-    """Errors in standard deviations, both (n,), where both are known and the deviation is positive."""
-    known = np.isfinite(error) & np.isfinite(sd) & (sd > 0.0)
-    if known.all():
-        return error / sd
-    found: Floats = error[known] / sd[known]
-    return found
+    """Errors in standard deviations, both (n,), where both are known and the deviation is not zero."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = error / sd
+    known = np.isfinite(ratio)
+    return ratio if known.all() else ratio[known]
+
+
+def squared_sum(error: Floats, sd: Floats) -> tuple[float, int]:
+    """Sum of the squares of what :func:`normalised` gives, and of how many; the same bits at any address."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = error / sd
+        total = float(np.sum(ratio * ratio))
+    if math.isfinite(total):
+        return total, len(ratio)
+    ratio = normalised(error, sd)
+    return float(np.sum(ratio * ratio)), len(ratio)
 
 
 def effective_samples(errors: Floats) -> float:

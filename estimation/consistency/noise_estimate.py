@@ -6,7 +6,7 @@ its jerk times the cube of the spacing over 4.5: micrometres at 100 frames a sec
 millimetre at ten. So they tell noise from manoeuvres without knowing any model of either.
 
 Noise that one frame shares with the next, as filtered or shaking markers have it, is missing in them.
-Therefore the same differences are taken over strides of 50 ms as well. Over these a speed step is as large as
+Therefore the same differences are taken over strides of some 50 ms as well. Over these a speed step is as large as
 noise is, so that they can keep the scale from falling below one, and no more.
 
 Noise is that of bodies that move; who stands is quieter, and isn't asked.
@@ -31,8 +31,8 @@ REFUTED = 1.3
 """Scale above which what was told is refuted."""
 
 _NS = 1e-9
-_STRIDE_NS = 50_000_000  # longer than marker filters and the shaking of a wheel remember
-_LONGEST_NS = 500_000_000  # four positions further apart tell more of the motion than of the noise
+STRIDE_NS = 47_000_000  # no multiple of a usual spacing of frames, so that a microsecond doesn't matter
+LONGEST_NS = 520_000_000  # four positions further apart tell more of the motion than of the noise
 _LEAST_LEFT = 0.05  # of an innovation after the update; what leaves less tells nothing of the noise
 _HALF_TRACK = 0.1  # by which a turn rate is the speed of a wheel [m]
 
@@ -91,7 +91,7 @@ class NoiseScale(NamedTuple):
 class NoiseEstimate(NamedTuple):
     """All that is known of the noise.
 
-    scale: what measurements are taken with now. frames, strides: neighbouring frames, and frames at least
+    scale: what measurements are taken with now. frames, strides: neighbouring frames, and frames some
     50 ms apart. gated: whether the newest frame or sighting wasn't believed.
     """
 
@@ -156,11 +156,11 @@ def noise_with_frame(
         since_ns = moment.capture_ns - estimate.frames.a.capture_ns
         if since_ns <= 0:
             return estimate
-        if since_ns > _LONGEST_NS:
+        if since_ns > LONGEST_NS:
             estimate = kept_noise(estimate)._replace(gated=gated)
     by_frame = _differenced(estimate.by_frame, estimate.frames, estimate.strides, moment, learning)
     by_stride, strides = estimate.by_stride, estimate.strides
-    if strides.held == 0 or moment.capture_ns - strides.a.capture_ns >= _STRIDE_NS:
+    if strides.held == 0 or moment.capture_ns - strides.a.capture_ns >= STRIDE_NS:
         by_stride = _differenced(by_stride, strides, strides, moment, learning)
         strides = _pushed(strides, moment)
     scale = estimate.scale._replace(
@@ -232,7 +232,7 @@ def _differenced(
     levels: Levels, before: Moments, long_before: Moments, moment: Moment, learning: NoiseLearning
 ) -> Levels:
     """Levels with the differences of a frame and the three before it, of the bodies that move."""
-    far = moment.capture_ns - before.c.capture_ns > _LONGEST_NS
+    far = moment.capture_ns - before.c.capture_ns > LONGEST_NS
     if before.held < 3 or long_before.held < 3 or far:
         return levels
     since = long_before.c

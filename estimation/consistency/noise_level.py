@@ -10,8 +10,8 @@ from formation.kernel import kernel
 LEAST_SCALE, MOST_SCALE = 0.1, 30.0
 """Within which the noise is looked for, in multiples of what is told."""
 
-_CLIP = 2.25  # variances that a square counts for at the most: outliers and speed steps are few
-_CLIPPED_MEAN = 0.7785  # of the square of a standard normal that is cut off there
+CLIP = 2.25  # variances that a square counts for at the most: outliers and speed steps are few
+CLIPPED_MEAN = 0.7785  # of the square of a standard normal that is cut off there
 _BEGIN = 4.0  # differences that what is told counts as
 _QUICK, _SLOW = 64.0, 1000.0  # differences that the two means reach back
 _CHANGED = 2.2  # factor between the two variances, some four deviations, by which the noise has changed
@@ -58,7 +58,7 @@ def _mean_with(mean: float, square: float, predicted: float, weight: float) -> f
     predicted: how much of the square the prediction accounts for; the less of it is noise, the less it tells.
     """
     expected = mean + predicted
-    news = (min(square / expected, _CLIP) / _CLIPPED_MEAN - 1.0) * mean / expected
+    news = (min(square / expected, CLIP) / CLIPPED_MEAN - 1.0) * mean / expected
     most, least = MOST_SCALE * MOST_SCALE, LEAST_SCALE * LEAST_SCALE
     return min(most, max(least, mean * (1.0 + news / weight)))
 

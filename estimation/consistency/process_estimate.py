@@ -1,9 +1,9 @@
 """The leader's process noise, found: a bank of filters that differ by it, weighed by how well they predict.
 
-Some filters share all but the density q_v that drives the speed, others all but q_u that drives the turn rate,
-each in steps of a constant ratio from a leader that never changes to one that does as it likes. They run
-beside the main filter on what this has believed, put together over a thirtieth of a second, since noise is a
-slow thing to learn. The score of each is the logarithm of its likelihood, forgotten over half a minute.
+Some filters share all but the density q_v that drives the speed, others all but q_u that drives the turn
+rate, each in steps of a constant ratio from a leader that never changes to one that does as it likes. They
+run beside the main filter on what this has believed, put together over a thirtieth of a second, since noise
+is a slow thing to learn. The score of each is the logarithm of its likelihood, forgotten over half a minute.
 
 Between members the score is that of white noise whose power is told wrongly by the ratio e^y (Whittle):
 K (y + exp(-y)), highest where y = 0. Three members around the best one tell where that is.
@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from estimation.filters.ekf import informed
 from estimation.filters.filter import EKF, Filter
 from estimation.filters.gaussian import Gaussian, nis_of
 from estimation.models.coordinated_turn import FollowerMotion, ProcessNoise, Spread, mean_motion
@@ -22,11 +23,11 @@ from estimation.tracking.track_point import TrackPoint
 from formation.kernel import kernel
 from formation.records import Rows, load, store
 
-TURN_MEMBERS, TURN_STEP, TURN_LOWEST = 7, math.log(4.0), math.log(4.0**-5)
-"""Members for the turn rate, ratio between them and lowest bandwidth, as logarithms: 0.001 to 4 per second."""
+TURN_MEMBERS, TURN_RATIO, TURN_LOWEST = 7, 4.0, 4.0**-5
+"""Members for the turn rate, ratio between them, and the lowest bandwidth: from 0.001 to 4 per second."""
 
-SPEED_MEMBERS, SPEED_STEP, SPEED_LOWEST = 8, math.log(8.0), math.log(8.0**-7)
-"""Members for the speed: 5e-7 to 1 per second."""
+SPEED_MEMBERS, SPEED_RATIO, SPEED_LOWEST = 8, 8.0, 8.0**-7
+"""Members for the speed: from 5e-7 to 1 per second."""
 
 MEMBERS = TURN_MEMBERS + SPEED_MEMBERS
 
@@ -34,11 +35,12 @@ FORGOTTEN = 30.0
 """Time [s] in which scores are forgotten."""
 
 SHARE = 0.8
-"""Share of the likeliest noise that is taken. Of leaders that move as the filter's model says it makes errors
-larger than reported by a tenth, of those that steer smoothly it takes as much off errors reported too large."""
+"""Share of the likeliest noise that is taken. For leaders that move as the filter's model says it makes
+errors larger than reported by a tenth; for those that steer smoothly what is reported is too large by more.
+"""
 
 _TOLD_SD = math.log(10.0)  # what is told is known to a factor of ten
-_FALLING = 0.5  # [1/s]: calm leaders are believed to be calm after they have been so for a while
+_FALLING = 0.75  # [1/s]: calm leaders are believed to be calm after they have been so for a while
 _INTERVAL_NS = 30_000_000
 _SETTLING_NS = 500_000_000
 _LARGEST_NIS = 400.0  # a member further off starts again from the main filter
@@ -65,14 +67,26 @@ class Member(NamedTuple):
     score: float
 
 
+class Trial(NamedTuple):
+    """What a member is tried by: its noise, the time to a measurement, the share of scores kept, and that."""
+
+    noise: ProcessNoise
+    dt: float
+    kept: float
+    x: float
+    y: float
+    spread: Spread
+
+
 class LearnedProcess(NamedTuple):
     """What has been learned, and what is being put together for the bank.
 
     speed, turn: ratios of q_v and q_u to what is told. settled_ns: since when the track is settled, 0 if it
-    is not. begun: whether the bank runs. at_ns: time of its beliefs. ended_ns: capture of the last measurement
-    in them; motion: of the follower then. count, later_ns, x, y: number of measurements put together since,
-    the sum of their times after ``ended_ns``, and sums of positions. way_s, way: time [s] since ``ended_ns``
-    over which the follower's way is known, and sums over it of its motion, and of its variances, times time.
+    is not. begun: whether the bank runs. at_ns: time of its beliefs. ended_ns: capture of the last
+    measurement in them; motion: of the follower then. count, later_ns, x, y: number of measurements put
+    together since, the sum of their times after ``ended_ns``, and sums of positions. way_s, way:
+    time [s] since ``ended_ns`` over which the follower's way is known, and the sums of its motion over that,
+    its variances times time.
     """
 
     speed: float
@@ -201,23 +215,14 @@ def _scored(
     dt = (due_ns - learned.at_ns) * _NS
     motion = _way_of(learned, measurement, dt)
     kept, found = math.exp(-dt / FORGOTTEN), learned_noise(learned, rules)
-    for k in range(MEMBERS):
-        noise = found
-        if k < TURN_MEMBERS:
-            noise = found._replace(q_u=rules.turn * math.exp(TURN_LOWEST + TURN_STEP * k))
-        else:
-            noise = found._replace(q_v=rules.speed * math.exp(SPEED_LOWEST + SPEED_STEP * (k - TURN_MEMBERS)))
-        one = estimator._replace(kind=EKF, noise=noise)
-        member = load(Member, bank, k)
-        prior = one.predict(member.belief, dt, motion)
-        nis = nis_of(prior, x, y, spread)
-        a, b, c = prior.x_x + spread.xx, prior.x_y + spread.xy, prior.y_y + spread.yy
-        score = kept * member.score - 0.5 * (min(nis, _LARGEST_NIS) + math.log(a * c - b * b))
-        if nis <= _LARGEST_NIS:
-            put = measurement._replace(x=x, y=y, spread=spread)
-            store(bank, k, Member(one.update(prior, put), score))
-        else:
-            store(bank, k, Member(belief, score))
+    tried = rules.turn * TURN_LOWEST
+    for k in range(TURN_MEMBERS):
+        _score(bank, k, Trial(found._replace(q_u=tried), dt, kept, x, y, spread), motion, belief, estimator)
+        tried = tried * TURN_RATIO
+    tried = rules.speed * SPEED_LOWEST
+    for k in range(TURN_MEMBERS, MEMBERS):
+        _score(bank, k, Trial(found._replace(q_v=tried), dt, kept, x, y, spread), motion, belief, estimator)
+        tried = tried * SPEED_RATIO
     speed = _taken(bank, rules.told.q_v / rules.speed, learned.speed, dt, False)
     turn = _taken(bank, rules.told.q_u / rules.turn, learned.turn, dt, True)
     return learned._replace(
@@ -235,19 +240,36 @@ def _scored(
     )
 
 
+@kernel(inline=False)
+def _score(
+    bank: Rows[Member], k: int, trial: Trial, motion: FollowerMotion, belief: Gaussian, estimator: Filter
+) -> None:
+    """Move a member on to a measurement, score it by that, and let it take it in."""
+    member, spread = load(Member, bank, k), trial.spread
+    one = estimator._replace(kind=EKF, noise=trial.noise)
+    prior = one.predict(member.belief, trial.dt, motion)
+    nis = nis_of(prior, trial.x, trial.y, spread)
+    a, b, c = prior.x_x + spread.xx, prior.x_y + spread.xy, prior.y_y + spread.yy
+    score = trial.kept * member.score - 0.5 * (min(nis, _LARGEST_NIS) + math.log(a * c - b * b))
+    if nis <= _LARGEST_NIS:
+        store(bank, k, Member(informed(prior, trial.x, trial.y, spread), score))
+    else:
+        store(bank, k, Member(belief, score))
+
+
 @kernel
 def _taken(bank: Rows[Member], told: float, before: float, dt: float, turn: bool) -> float:
     """Ratio to the told bandwidth to go on with: the likeliest, but no faster down than leaders may calm."""
-    first, count, lowest, step = TURN_MEMBERS, SPEED_MEMBERS, SPEED_LOWEST, SPEED_STEP
+    first, count, lowest, ratio = TURN_MEMBERS, SPEED_MEMBERS, SPEED_LOWEST, SPEED_RATIO
     if turn:
-        first, count, lowest, step = 0, TURN_MEMBERS, TURN_LOWEST, TURN_STEP
-    centre = math.log(told)
-    best, highest = 0, _posterior(bank, first, lowest - centre)
+        first, count, lowest, ratio = 0, TURN_MEMBERS, TURN_LOWEST, TURN_RATIO
+    lowest, step = math.log(lowest / told), math.log(ratio)
+    best, highest = 0, _posterior(bank, first, lowest)
     for k in range(1, count):
-        here = _posterior(bank, first + k, lowest + step * k - centre)
+        here = _posterior(bank, first + k, lowest + step * k)
         if here > highest:
             best, highest = k, here
-    off = lowest + step * best - centre
+    off = lowest + step * best
     if 0 < best < count - 1:
         below = highest - _posterior(bank, first + best - 1, off - step)
         above = highest - _posterior(bank, first + best + 1, off + step)
@@ -259,7 +281,7 @@ def _taken(bank: Rows[Member], told: float, before: float, dt: float, turn: bool
 def _posterior(bank: Rows[Member], k: int, off: float) -> float:
     """Score of a member with what is told: its logarithm is off by this much from the told one."""
     apart = off / _TOLD_SD
-    return load(Member, bank, k).score - 0.5 * apart * apart
+    return load(Member, bank, k).score - math.log(1.0 + 0.5 * apart * apart)
 
 
 @kernel

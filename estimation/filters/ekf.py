@@ -32,7 +32,7 @@ def mean_of(b: Gaussian) -> State:
 
 
 @kernel
-def extended_carried(b: Gaussian, dt: float) -> Gaussian:
+def extended_moved(b: Gaussian, dt: float, noise: ProcessNoise) -> Gaussian:
     """Carry a belief through dt [s] in a fixed frame: the covariance by the Jacobian of the motion."""
     t = swing(b.u, dt)
     before = mean_of(b)
@@ -54,7 +54,7 @@ def extended_carried(b: Gaussian, dt: float) -> Gaussian:
     mx_x = b.x_x + s * b.x_vx - c * b.x_vy + j.x * b.x_u
     mx_y = b.x_y + s * b.y_vx - c * b.y_vy + j.x * b.y_u
     my_y = b.y_y + c * b.y_vx + s * b.y_vy + j.y * b.y_u
-    return b._replace(
+    carried = b._replace(
         x=after.x,
         y=after.y,
         vx=after.vx,
@@ -74,12 +74,7 @@ def extended_carried(b: Gaussian, dt: float) -> Gaussian:
         vy_vy=si * mvy_vx + co * mvy_vy + j.vy * mvy_u,
         vy_u=mvy_u,
     )
-
-
-@kernel
-def extended_moved(b: Gaussian, dt: float, noise: ProcessNoise) -> Gaussian:
-    """The same, with the noise of the motion."""
-    return driven(extended_carried(b, dt), mean_of(b), dt, noise)
+    return driven(carried, before, dt, noise)
 
 
 @kernel

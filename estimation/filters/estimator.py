@@ -129,8 +129,8 @@ class Interpreted:
         """See :meth:`Estimator.update`."""
         return _remembering(self.estimator.update(whole_of(belief), measurement))
 
-    def shown(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
-        """See :meth:`~estimation.filters.filter.Filter.shown`; no lever arm is known of here."""
+    def leader(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
+        """See :meth:`~estimation.filters.filter.Filter.leader`; no lever arm is known of here."""
         return belief
 
     def step(

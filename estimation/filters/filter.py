@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 from estimation.filters.belief import Model
 from estimation.filters.difference import differenced, first_difference
-from estimation.filters.ekf import driven, extended_carried, informed, mean_of, seen_by_follower
+from estimation.filters.ekf import extended_moved, informed, mean_of, seen_by_follower
 from estimation.filters.gaussian import Gaussian, nis_of, started
 from estimation.filters.leader_prior import standing_noise, within_limits
-from estimation.filters.lever_arm import NO_LEVER, Lever, at_body, at_robot
-from estimation.filters.ukf import unscented_carried
+from estimation.filters.lever_arm import NO_LEVER, Lever, robot_under, swung
+from estimation.filters.ukf import unscented_moved
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, moved
 from estimation.models.measurement import FrontEnd, Measurement
 from formation.arc import swing
@@ -48,7 +48,7 @@ class Filter(NamedTuple):
 
     Along the follower's axes, where sensors and odometry say less, the leader's limits are told all along.
     ``correlation`` [s]: of the errors of v2 and u2. ``cutoff`` [s]: of the low-pass behind differences.
-    ``lever``: where the body that mocap frames show sits on the leader; differences know none.
+    ``lever``: where the body that mocap shows sits on the leader. Beliefs are about the body then.
     """
 
     kind: int
@@ -75,20 +75,18 @@ class Filter(NamedTuple):
         """Belief from the first measurement alone."""
         if self.kind == DIFFERENCE:
             return first_difference(measurement, self.limits)
-        begun = started(measurement.x, measurement.y, measurement.spread, self.limits)
-        if self._shows_body(measurement):
-            return at_robot(begun, self.lever, self.limits.v_eps)
-        return begun
+        return started(measurement.x, measurement.y, measurement.spread, self.limits)
 
     @kernel
     def predict(self, belief: Gaussian, dt: float, follower: FollowerMotion) -> Gaussian:
         """Belief after dt [s], the follower having moved as given."""
-        ahead = unscented_carried(belief, dt) if self.kind == UKF else extended_carried(belief, dt)
         noise = self.noise if self.in_world else standing_noise(belief, self.noise)
-        if self.lever.is_centred():
-            ahead = driven(ahead, mean_of(belief), dt, noise)
+        if self.kind == UKF:
+            ahead = unscented_moved(belief, dt, noise)
         else:
-            ahead = self._driven_by_body(ahead, belief, dt, noise)
+            ahead = extended_moved(belief, dt, noise)
+        if not self.lever.vanishes():
+            ahead = swung(ahead, belief, self.lever, self.limits.v_eps, noise.q_u, dt)
         if self.kind == DIFFERENCE:
             rates = belief.rates
             ahead = ahead._replace(rates=rates._replace(elapsed=rates.elapsed + dt))
@@ -103,35 +101,14 @@ class Filter(NamedTuple):
         """Belief after a measurement at the belief's time."""
         if self.kind == DIFFERENCE:
             return differenced(belief, measurement, self.limits, self.cutoff)
-        if self._shows_body(measurement):
-            return self._informed_by_body(belief, measurement)
         return informed(belief, measurement.x, measurement.y, measurement.spread)
 
     @kernel
-    def shown(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
-        """Belief about what a measurement sees: the leader, or the body on it."""
-        if self._shows_body(measurement):
-            return at_body(belief, self.lever, self.limits.v_eps)
-        return belief
-
-    @kernel
-    def _shows_body(self, measurement: Measurement) -> bool:
-        return measurement.framed and not self.lever.is_centred()
-
-    @kernel(inline=False)
-    def _informed_by_body(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
-        body = at_body(belief, self.lever, self.limits.v_eps)
-        after = informed(body, measurement.x, measurement.y, measurement.spread)
-        return at_robot(after, self.lever, self.limits.v_eps)
-
-    @kernel(inline=False)
-    def _driven_by_body(self, ahead: Gaussian, before: Gaussian, dt: float, noise: ProcessNoise) -> Gaussian:
-        """Noise across the direction of travel stands for a direction that is not trusted, not for turning.
-
-        So it must not swing the body about: it goes into the belief about the body.
-        """
-        body = at_body(ahead, self.lever, self.limits.v_eps)
-        return at_robot(driven(body, mean_of(before), dt, noise), self.lever, self.limits.v_eps)
+    def leader(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
+        """Belief about the leader itself, the newest measurement being given; sightings see no body."""
+        if self.lever.vanishes() or not measurement.framed:
+            return belief
+        return robot_under(belief, self.lever, self.limits.v_eps)
 
     @kernel
     def step(
@@ -142,7 +119,7 @@ class Filter(NamedTuple):
         One whose NIS is above ``gate``, or is not a number, is left out: the belief is then the prediction.
         """
         prior = self.predict(belief, dt, follower)
-        nis = nis_of(self.shown(prior, measurement), measurement.x, measurement.y, measurement.spread)
+        nis = nis_of(prior, measurement.x, measurement.y, measurement.spread)
         if nis <= gate:
             return Stepped(self.update(prior, measurement), nis)
         return Stepped(prior, nis)

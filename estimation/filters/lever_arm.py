@@ -1,9 +1,11 @@
-"""The leader's body beside its wheel axis: a belief about the robot as one about the body, and back.
+"""The leader's body beside its wheel axis: a filter tracks the body, and this tells the robot under it.
 
-Mocap shows b = p + R(psi) m, with m the body's place on the robot and psi the direction of travel, which is
-that of the velocity w. The direction is the estimated one: no orientation of the leader's is looked at.
-Beliefs are carried over by the Jacobian of this map, which can be undone. A measured b is linear in the one
-about the body, so that what is learned of the velocity does not depend on where the map was linearised.
+Mocap shows b = p + R(psi) m, with m the body's place on the robot and psi the direction of travel. The body
+drives circles about the same centre as the robot and turns as fast, so that the coordinated turn holds for
+its velocity V as it does for the robot's w; a change of the turn rate u changes V, too. What is measured is
+then linear in the belief, however little is known of psi. Along the robot's axes V is (v - u m_y, u m_x),
+which tells psi and v out of V and u: the direction is the estimated one, of the leader's orientation nothing
+is seen.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ class Lever(NamedTuple):
     y: float
 
     @kernel
-    def is_centred(self) -> bool:
+    def vanishes(self) -> bool:
         """Whether the body sits above the middle of the wheel axis."""
         return self.x == 0.0 and self.y == 0.0
 
@@ -30,64 +32,150 @@ class Lever(NamedTuple):
 NO_LEVER = Lever(0.0, 0.0)
 
 
-class Arm(NamedTuple):
-    """The way from the robot to its body in the frame of the belief [m], and its derivatives by w [s]."""
+class Change(NamedTuple):
+    """By how much something changes the robot's position and velocity."""
 
     x: float
     y: float
-    x_vx: float
-    x_vy: float
-    y_vx: float
-    y_vy: float
+    vx: float
+    vy: float
 
 
-@kernel
-def arm_at(vx: float, vy: float, lever: Lever, v_eps: float) -> Arm:
-    """Arm of a leader at a velocity.
+class Travel(NamedTuple):
+    """Direction of travel by a body's velocity and turn rate, and the robot's speed [m/s], with derivatives.
 
-    Below ``v_eps`` [m/s] the velocity says little of a direction: the arm shrinks with the speed there, and
-    its derivative stays what it is at that speed: an uncertain velocity leaves the place uncertain by
-    about the arm.
+    ``ex``, ``ey``: a unit vector, shorter where the body is slower than ``v_eps``. Their derivatives and the
+    speed's are by V_x, V_y and u, in this order.
     """
-    speed = math.sqrt(vx * vx + vy * vy)
-    if speed < v_eps:
-        a, b = lever.x / v_eps, lever.y / v_eps
-        return Arm(a * vx - b * vy, b * vx + a * vy, a, -b, b, a)
-    ex, ey = vx / speed, vy / speed
-    x, y = ex * lever.x - ey * lever.y, ey * lever.x + ex * lever.y
-    nx, ny = -ey / speed, ex / speed
-    return Arm(x, y, -y * nx, -y * ny, x * nx, x * ny)
+
+    ex: float
+    ey: float
+    v: float
+    ex_by: tuple[float, float, float]
+    ey_by: tuple[float, float, float]
+    v_by: tuple[float, float, float]
 
 
 @kernel
-def _shifted(b: Gaussian, arm: Arm, sign: float) -> Gaussian:
-    """Belief of which the position is moved along the arm, or back by it."""
-    xx, xy, yx, yy = sign * arm.x_vx, sign * arm.x_vy, sign * arm.y_vx, sign * arm.y_vy
-    # Covariances of what is added with the velocity.
-    x_vx, x_vy = xx * b.vx_vx + xy * b.vx_vy, xx * b.vx_vy + xy * b.vy_vy
-    y_vx, y_vy = yx * b.vx_vx + yy * b.vx_vy, yx * b.vx_vy + yy * b.vy_vy
-    return b._replace(
-        x=b.x + sign * arm.x,
-        y=b.y + sign * arm.y,
-        x_x=b.x_x + 2.0 * (xx * b.x_vx + xy * b.x_vy) + (xx * x_vx + xy * x_vy),
-        x_y=b.x_y + (xx * b.y_vx + xy * b.y_vy) + (yx * b.x_vx + yy * b.x_vy) + (yx * x_vx + yy * x_vy),
-        x_vx=b.x_vx + x_vx,
-        x_vy=b.x_vy + x_vy,
-        x_u=b.x_u + xx * b.vx_u + xy * b.vy_u,
-        y_y=b.y_y + 2.0 * (yx * b.y_vx + yy * b.y_vy) + (yx * y_vx + yy * y_vy),
-        y_vx=b.y_vx + y_vx,
-        y_vy=b.y_vy + y_vy,
-        y_u=b.y_u + yx * b.vx_u + yy * b.vy_u,
+def travel(vx: float, vy: float, u: float, lever: Lever, v_eps: float) -> Travel:
+    """How the robot travels under a body of velocity V that turns at u.
+
+    A body that is slower than ``v_eps`` [m/s], or hardly faster than it turns about its robot, says little of
+    a direction: what is divided by does not fall below that, so that the derivatives stay within bounds.
+    """
+    g = u * lever.x
+    square = max(vx * vx + vy * vy, v_eps * v_eps)
+    ahead, least = square - g * g, 0.25 * v_eps * v_eps
+    free = 1.0 if ahead > least else 0.0
+    moving = free if square > v_eps * v_eps else 0.0
+    f = math.sqrt(max(ahead, least))
+    # By V_x, V_y and u: of f, the speed along the heading, and of |V|^2.
+    fx, fy, fu = moving * vx / f, moving * vy / f, -free * g * lever.x / f
+    whole = f * f + g * g
+    sx, sy, su = 2.0 * f * fx, 2.0 * f * fy, 2.0 * (f * fu + g * lever.x)
+    ex, ey = (f * vx + g * vy) / whole, (f * vy - g * vx) / whole
+    return Travel(
+        ex,
+        ey,
+        f + u * lever.y,
+        (
+            (f + fx * vx - ex * sx) / whole,
+            (g + fy * vx - ex * sy) / whole,
+            (fu * vx + lever.x * vy - ex * su) / whole,
+        ),
+        (
+            (fx * vy - g - ey * sx) / whole,
+            (f + fy * vy - ey * sy) / whole,
+            (fu * vy - lever.x * vx - ey * su) / whole,
+        ),
+        (fx, fy, fu + lever.y),
     )
 
 
 @kernel
-def at_body(belief: Gaussian, lever: Lever, v_eps: float) -> Gaussian:
-    """Belief about the leader's body out of one about the leader."""
-    return _shifted(belief, arm_at(belief.vx, belief.vy, lever, v_eps), 1.0)
+def _change(t: Travel, k: int, lever: Lever) -> Change:
+    """Change of the robot's position and velocity by V_x, V_y or u, the body's position being the same."""
+    ex, ey = t.ex_by[k], t.ey_by[k]
+    return Change(
+        -(ex * lever.x - ey * lever.y),
+        -(ey * lever.x + ex * lever.y),
+        t.v_by[k] * t.ex + t.v * ex,
+        t.v_by[k] * t.ey + t.v * ey,
+    )
 
 
 @kernel
-def at_robot(belief: Gaussian, lever: Lever, v_eps: float) -> Gaussian:
-    """Belief about the leader out of one about its body."""
-    return _shifted(belief, arm_at(belief.vx, belief.vy, lever, v_eps), -1.0)
+def _mixed(a: Change, b: Change, c: Change, x: float, y: float, u: float) -> Change:
+    """What changes by V_x, V_y and u make together, each times its number."""
+    return Change(
+        a.x * x + b.x * y + c.x * u,
+        a.y * x + b.y * y + c.y * u,
+        a.vx * x + b.vx * y + c.vx * u,
+        a.vy * x + b.vy * y + c.vy * u,
+    )
+
+
+@kernel(inline=False)
+def robot_under(b: Gaussian, lever: Lever, v_eps: float) -> Gaussian:
+    """Belief about the leader out of one about its body, by the derivative of the way between them."""
+    t = travel(b.vx, b.vy, b.u, lever, v_eps)
+    p, q, r = _change(t, 0, lever), _change(t, 1, lever), _change(t, 2, lever)
+    # Covariances of the robot's position and velocity with the body's V and u, and with its position.
+    on_vx = _mixed(p, q, r, b.vx_vx, b.vx_vy, b.vx_u)
+    on_vy = _mixed(p, q, r, b.vx_vy, b.vy_vy, b.vy_u)
+    on_u = _mixed(p, q, r, b.vx_u, b.vy_u, b.u_u)
+    on_x = _mixed(p, q, r, b.x_vx, b.x_vy, b.x_u)
+    on_y = _mixed(p, q, r, b.y_vx, b.y_vy, b.y_u)
+    own_x = Change(on_vx.x + b.x_vx, on_vx.y + b.y_vx, on_vx.vx, on_vx.vy)
+    own_y = Change(on_vy.x + b.x_vy, on_vy.y + b.y_vy, on_vy.vx, on_vy.vy)
+    own_u = Change(on_u.x + b.x_u, on_u.y + b.y_u, on_u.vx, on_u.vy)
+    return b._replace(
+        x=b.x - (t.ex * lever.x - t.ey * lever.y),
+        y=b.y - (t.ey * lever.x + t.ex * lever.y),
+        vx=t.v * t.ex,
+        vy=t.v * t.ey,
+        x_x=b.x_x + on_x.x + (p.x * own_x.x + q.x * own_y.x + r.x * own_u.x),
+        x_y=b.x_y + on_x.y + (p.x * own_x.y + q.x * own_y.y + r.x * own_u.y),
+        x_vx=on_x.vx + (p.x * own_x.vx + q.x * own_y.vx + r.x * own_u.vx),
+        x_vy=on_x.vy + (p.x * own_x.vy + q.x * own_y.vy + r.x * own_u.vy),
+        x_u=own_u.x,
+        y_y=b.y_y + on_y.y + (p.y * own_x.y + q.y * own_y.y + r.y * own_u.y),
+        y_vx=on_y.vx + (p.y * own_x.vx + q.y * own_y.vx + r.y * own_u.vx),
+        y_vy=on_y.vy + (p.y * own_x.vy + q.y * own_y.vy + r.y * own_u.vy),
+        y_u=own_u.y,
+        vx_vx=p.vx * own_x.vx + q.vx * own_y.vx + r.vx * own_u.vx,
+        vx_vy=p.vx * own_x.vy + q.vx * own_y.vy + r.vx * own_u.vy,
+        vx_u=own_u.vx,
+        vy_vy=p.vy * own_x.vy + q.vy * own_y.vy + r.vy * own_u.vy,
+        vy_u=own_u.vy,
+    )
+
+
+@kernel(inline=False)
+def swung(b: Gaussian, before: Gaussian, lever: Lever, v_eps: float, q_u: float, dt: float) -> Gaussian:
+    """Belief about the body after dt [s] in which the turn rate was driven by q_u, beside what u itself gets.
+
+    A change of u changes V by J R(psi) m. As far as psi is not known, it does so in any direction.
+    """
+    t = travel(before.vx, before.vy, before.u, lever, v_eps)
+    cx, cy = -(t.ey * lever.x + t.ex * lever.y), t.ex * lever.x - t.ey * lever.y
+    unknown = max(0.0, 1.0 - (t.ex * t.ex + t.ey * t.ey))
+    rest = 0.5 * unknown * (lever.x * lever.x + lever.y * lever.y)
+    xx, xy, yy = q_u * (cx * cx + rest), q_u * cx * cy, q_u * (cy * cy + rest)
+    twice, thrice = 0.5 * dt * dt, dt * dt * dt * (1.0 / 3.0)
+    return b._replace(
+        x_x=b.x_x + thrice * xx,
+        x_y=b.x_y + thrice * xy,
+        x_vx=b.x_vx + twice * xx,
+        x_vy=b.x_vy + twice * xy,
+        x_u=b.x_u + twice * q_u * cx,
+        y_y=b.y_y + thrice * yy,
+        y_vx=b.y_vx + twice * xy,
+        y_vy=b.y_vy + twice * yy,
+        y_u=b.y_u + twice * q_u * cy,
+        vx_vx=b.vx_vx + dt * xx,
+        vx_vy=b.vx_vy + dt * xy,
+        vx_u=b.vx_u + dt * q_u * cx,
+        vy_vy=b.vy_vy + dt * yy,
+        vy_u=b.vy_u + dt * q_u * cy,
+    )

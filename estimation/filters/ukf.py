@@ -94,7 +94,7 @@ def _with_pair(sums: Sums, mean: State, column: State, centre: State, dt: float)
 
 
 @kernel(inline=False)
-def unscented_carried(b: Gaussian, dt: float) -> Gaussian:
+def unscented_moved(b: Gaussian, dt: float, noise: ProcessNoise) -> Gaussian:
     """Carry a belief through dt [s] in a fixed frame by its points."""
     mean = mean_of(b)
     centre = moved(mean, swing(mean.u, dt))
@@ -119,13 +119,7 @@ def unscented_carried(b: Gaussian, dt: float) -> Gaussian:
     sums = _with_pair(sums, mean, State(0.0, 0.0, 0.0, s.root, su), centre, dt)
     t = _pivot(5.0 * b.u_u - pu * pu - qu * qu - ru * ru - su * su)
     sums = _with_pair(sums, mean, State(0.0, 0.0, 0.0, 0.0, t.root), centre, dt)
-    return _moments(b, sums, centre)
-
-
-@kernel
-def unscented_moved(b: Gaussian, dt: float, noise: ProcessNoise) -> Gaussian:
-    """The same, with the noise of the motion."""
-    return driven(unscented_carried(b, dt), mean_of(b), dt, noise)
+    return driven(_moments(b, sums, centre), mean, dt, noise)
 
 
 @kernel

@@ -107,6 +107,7 @@ class OdometryCheck(NamedTuple):
     by_twist, by_pose: both sources. v, u: sums of the twist. late [s]: how much later than the motion
     odometry is, negative if earlier, 0 if not. doubt: mean misfit for a delay. bad_ns: when the newest
     sample came that was not finite. resets, reset_ns: how often its pose has jumped, and when last.
+    place_noise, heading_noise: variance of the track's poses over what is told of it, of ``poses``.
     """
 
     heard: bool
@@ -129,6 +130,9 @@ class OdometryCheck(NamedTuple):
     bad_ns: int
     resets: int
     reset_ns: int
+    place_noise: float
+    heading_noise: float
+    poses: int
 
 
 _NO_WAY = Ways(0.0, 0.0)
@@ -157,6 +161,9 @@ UNCHECKED = OdometryCheck(
     bad_ns=0,
     resets=0,
     reset_ns=0,
+    place_noise=1.0,
+    heading_noise=1.0,
+    poses=0,
 )
 
 

@@ -17,6 +17,9 @@ from formation.angles import wrapped
 from formation.kernel import kernel
 
 QUANTITIES = ("rho_dot", "alpha2_dot", "v1", "alpha1", "u1")
+GUESSED = math.pi * math.pi / 3.0
+"""Variance [rad^2] of an angle that may be any: uniform on the circle."""
+
 _LEAST = 1e-9  # of a distance [m] or speed [m/s] that is divided by
 _ROWS, _COLUMNS = np.triu_indices(len(QUANTITIES))
 
@@ -146,6 +149,18 @@ def estimate_of(
         status,
         jump,
     )
+
+
+@kernel
+def guessed_when_slow(estimate: Estimate, v_eps: float) -> Estimate:
+    """Estimate whose alpha1 is no better than a guess where the leader is slower than v_eps [m/s].
+
+    Who hardly moves has no direction of travel worth the name: it may stand, turn on the spot, or turn back.
+    More variance on the diagonal leaves the covariance positive semidefinite.
+    """
+    if estimate.v1 >= v_eps or estimate.joint.b_b >= GUESSED:
+        return estimate
+    return estimate._replace(joint=estimate.joint._replace(b_b=GUESSED))
 
 
 @kernel

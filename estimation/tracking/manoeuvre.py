@@ -33,7 +33,7 @@ SPEED_RAISED, TURN_RAISED = 0.3, 1.0
 """Bandwidths that the noise is raised to: a step of half of what a leader can do, every second or so."""
 
 SPEED_WIDER, TURN_WIDER = 2.0, 3.0
-"""How much larger noise is to be for a leader that makes jumps: normal noise of the same power has no tails."""
+"""How much larger noise is to be for a leader that makes jumps: noise of the same power has no such tails."""
 
 _LEAST_SPEED = 1e-9
 

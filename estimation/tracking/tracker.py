@@ -176,7 +176,7 @@ def follow(
         USED,
         stepped.nis,
         capture_ns,
-        is_settled(stepped.belief, last.settled, settings, estimator.limits),
+        is_settled(estimator.leader(stepped.belief, measurement), last.settled, settings, estimator.limits),
         no_tentative(stepped.belief),
         found.check,
         BELIEVED,
@@ -237,7 +237,8 @@ def _found(
     tentative = joined(last.tentative, measurement, estimator, gate_of(settings))
     if tentative.frames < settings.reacquire_frames:
         return anew._replace(tentative=tentative)
-    settled = is_settled(tentative.belief, False, settings, estimator.limits)
+    leader = estimator.leader(tentative.belief, measurement)
+    settled = is_settled(leader, False, settings, estimator.limits)
     return anew._replace(belief=tentative.belief, settled=settled)
 
 
@@ -252,17 +253,17 @@ def _taken_over(rejected: TrackPoint, settings: TrackSettings, estimator: Filter
     if tentative.frames < settings.reacquire_frames:
         return rejected
     prior, leader_fits = rejected.belief, rejected.nis <= gate_of(settings)
-    shown = estimator.shown(prior, measurement)
-    jump = jumped(rejected.jump, measurement, shown, rejected.check, leader_fits)
+    jump = jumped(rejected.jump, measurement, prior, rejected.check, leader_fits)
     if line_turn(jump, measurement) > settings.followed_turn:
         return rejected
     belief = estimator.update(prior, measurement) if leader_fits else tentative.belief
     check = check_from(measurement) if measurement.framed else rejected.check
+    leader = estimator.leader(belief, measurement)
     return rejected._replace(
         belief=belief,
         verdict=RESTARTED,
         used_ns=measurement.capture_ns,
-        settled=is_settled(belief, leader_fits and rejected.settled, settings, estimator.limits),
+        settled=is_settled(leader, leader_fits and rejected.settled, settings, estimator.limits),
         tentative=no_tentative(belief),
         check=check,
         cause=BELIEVED,

@@ -255,7 +255,17 @@ def _told(flight: Flight, plan: Plan, rooms: Rooms, kept: KeptEstimate, now_ns: 
         flight = flight._replace(estimates=flight.estimates + 1)
     control = at_time(load(ControlState, rooms.controls, k), now_ns)
     reported = Reported(
-        e.capture_ns, e.measured_ns, e.rho, e.alpha2, e.v1, e.alpha1, e.u1, e.joint.u_u, e.v2, e.u2
+        e.capture_ns,
+        e.measured_ns,
+        e.rho,
+        e.alpha2,
+        e.v1,
+        e.alpha1,
+        e.u1,
+        e.joint.u_u,
+        e.v2,
+        e.u2,
+        e.joint.b_u,
     )
     if not can_be(reported, now_ns):
         store(rooms.controls, k, control)

@@ -23,6 +23,7 @@ from hil.nodes.estimator_memory import EstimatorMemory, node_rules
 from hil.nodes.estimator_step import AUTO, MOCAP, Known, is_under_way
 from hil.nodes.findings import Findings, named_findings
 from hil.nodes.frame_time import clock_report
+from hil.nodes.leader_findings import leader_findings
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
 from hil.nodes.noise_report import noise_findings, noise_report, scale_of
 from hil.nodes.odometry_findings import odometry_findings
@@ -242,7 +243,8 @@ class EstimatorNode:
         """
         known, rules = state.memory.known, self.rules.step
         noise = noise_findings(known.noise, rules.noise_learning)
-        return odometry_findings(known, rules, now_ns) | noise
+        found = odometry_findings(known, rules, now_ns) | noise
+        return found | leader_findings(known.travel, now_ns)
 
     def _missing(self, known: Known) -> str:
         """What the estimator waits for to begin."""

@@ -14,6 +14,7 @@ from estimation.own_motion.own_track import OwnPoint
 from estimation.time.host_time import NO_TIME_YET, HostTime, TimeRows
 from estimation.tracking.estimate import Estimate
 from estimation.tracking.track_point import TrackPoint
+from estimation.tracking.travel_watch import NO_TRAVEL
 from formation.kernel import kernel
 from formation.records import Buffer, Rows, load, store
 from formation.ring import EMPTY
@@ -120,7 +121,7 @@ def noted(desk: Desk, digest: int, now_ns: int) -> bool:
     return now_ns >= notes.heard_ns - CLOCK_TOLERANCE_NS
 
 
-NOTHING_KNOWN = Known(EMPTY, EMPTY, EMPTY, IDEAL, UNCHECKED, 0, NOISE_AS_TOLD, NOTHING_LEARNED)
+NOTHING_KNOWN = Known(EMPTY, EMPTY, EMPTY, IDEAL, UNCHECKED, 0, NOISE_AS_TOLD, NOTHING_LEARNED, NO_TRAVEL)
 
 
 @kernel

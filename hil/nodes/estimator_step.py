@@ -70,7 +70,7 @@ from estimation.own_motion.own_track import (
     own_predicted,
     own_reprocessed,
 )
-from estimation.tracking.estimate import Estimate, estimate_at
+from estimation.tracking.estimate import Estimate, estimate_at, guessed_when_slow
 from estimation.tracking.follower_check import BELIEVED
 from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
 from estimation.tracking.follower_check import GATED as LEADER_OFF
@@ -86,6 +86,7 @@ from estimation.tracking.tracker import (
     status_of,
     with_motion,
 )
+from estimation.tracking.travel_watch import TravelWatch, watched
 from formation.kernel import kernel
 from formation.mount import NO_MOUNT, Mount, robot_pose
 from formation.records import Rows, store
@@ -136,7 +137,8 @@ class Known(NamedTuple):
     """Where the rows are filled, by what odometry is corrected, and how far it is believed.
 
     ``watched_ns``: capture of the first frame since when odometry is missed, 0 before. ``noise``: of
-    measurements, as they tell it. ``process``: what is known of how the leader drives.
+    measurements, as they tell it. ``process``: what is known of how the leader drives. ``travel``: which
+    way the leader went, where it is seen in the world.
     """
 
     track: Ring
@@ -147,6 +149,7 @@ class Known(NamedTuple):
     watched_ns: int
     noise: NoiseEstimate
     process: LearnedProcess
+    travel: TravelWatch
 
 
 class Taken(NamedTuple):
@@ -370,6 +373,9 @@ def take(known: Known, memory: Memory, rules: Rules, measurement: Measurement) -
         _shorten_way(known, memory, rules, measurement.capture_ns)
     if learning.on and not late:
         known = known._replace(process=_learned(known, memory, rules, added.verdict))
+    if rules.filter.in_world and not late:
+        point, settings = newest(points, added.ring), rules.settings
+        known = known._replace(travel=watched(known.travel, point, settings.lost_after, rules.filter.limits))
     return Taken(known, added.verdict, cause, late)
 
 
@@ -513,4 +519,6 @@ def is_under_way(known: Known, rules: Rules) -> bool:
 def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) -> Told:
     """Newest estimate of a track that has one, its status as seen at ``now_ns``."""
     point = newest(points, known.track)
-    return Told(estimate_at(point, status_of(point, now_ns, rules.settings)), point.cause)
+    point = point._replace(belief=rules.filter.leader(point.belief, point.measurement))
+    told = estimate_at(point, status_of(point, now_ns, rules.settings))
+    return Told(guessed_when_slow(told, rules.filter.limits.v_eps), point.cause)

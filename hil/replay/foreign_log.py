@@ -154,7 +154,7 @@ def _poses(log: Log, chart: TopicMap, name: str) -> list[_SeenPose]:
 
 def _motions(log: Log, chart: TopicMap) -> list[_Input]:
     name, own = chart.topics.odometry, topics_of(chart.scenario)
-    if name is None or not (needs_odometry(chart.scenario) or name in _bare(log.topics)):
+    if name is None or (name not in _bare(log.topics) and not _is_missed(log, chart)):
         return []
     topic = _present(log, chart, name, _MOTIONS)
     motions: list[_Input] = []
@@ -177,6 +177,14 @@ def _motions(log: Log, chart: TopicMap) -> list[_Input]:
     if not motions:
         raise UsageError(f"log {log.path}: topic {topic!r} has no odometry that can be read; correct the map")
     return motions
+
+
+def _is_missed(log: Log, chart: TopicMap) -> bool:
+    """Whether odometry that the log does not have is needed, or seems to be there under another name."""
+    poses = {chart.topics.leader_pose, chart.topics.follower_pose}
+    others = {name for name, typename in log.topics.items() if typename in _MOTIONS}
+    misnamed = chart.scenario.estimator.own_motion == "auto" and _bare(others) - poses
+    return needs_odometry(chart.scenario) or bool(misnamed)
 
 
 def _sightings(log: Log, chart: TopicMap) -> list[_Input]:

@@ -93,7 +93,7 @@ def leader_lever(scenario: Scenario) -> Lever:
 def refuse_leader_lever(scenario: Scenario) -> None:
     """Raise :class:`UsageError` for a leader's body off its wheel axis where the estimator knows none."""
     given, lever = scenario.estimator, leader_lever(scenario)
-    if lever.is_centred():
+    if lever.vanishes():
         return
     without = given.kind not in ("ekf", "ukf") or given.bias_states or given.certify
     if without:

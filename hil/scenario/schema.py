@@ -257,8 +257,8 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``stamp_offset_s``: by how much trusted stamps are later than the robot's clock was at the capture.
     ``speed_bandwidth``: q_v = speed_bandwidth * k_v^2 per second (0.01 for leaders that drive evenly, 0.1
     for those that stop and go every few seconds).
-    ``process_noise``: estimated finds both bandwidths by what is seen of the leader, from the given ones on, and
-    notices steps of its speed and turn rate (``ekf``, ``ukf``); given takes them as they are.
+    ``process_noise``: estimated finds both bandwidths by what is seen of the leader, from the given ones on,
+    and notices steps of its speed and turn rate (``ekf``, ``ukf``); given takes them as they are.
     ``align_odometry``: odometry is corrected by the delay and scales that the follower's mocap track shows.
     ``slip_v2``, ``slip_u2``: share of v2 and u2 by which slip may falsify odometry; on the body front end.
     ``settled_heading``: standard deviation [rad] of the leader's direction from which on a track is trusted

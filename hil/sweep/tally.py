@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from controllers.guard import StopReason
 from estimation.bounds.bound_check import QUANTITY_OF
 from estimation.bounds.error_bounds import Perceived
-from estimation.consistency.nees import normalised
+from estimation.consistency.nees import squared_sum
 from estimation.tracking.estimate import QUANTITIES
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray, wrap
@@ -172,11 +172,11 @@ def _add_errors(tally: NDArray[np.void], columns: Columns, errors: dict[str, Flo
     for k, name in enumerate(QUANTITIES):
         if name in errors:
             sd = columns.samples.sd[:, k]
-            in_deviations = normalised(errors[name], sd)
+            total, count = squared_sum(errors[name], sd)
             tally["squares"][0, k] += np.sum(errors[name] ** 2)
             tally["covered"][0, k] += np.count_nonzero(np.abs(errors[name]) <= 3.0 * sd)
-            tally["nees_count"][0, k] += len(in_deviations)
-            tally["nees_sum"][0, k] += np.sum(in_deviations * in_deviations)
+            tally["nees_count"][0, k] += count
+            tally["nees_sum"][0, k] += total
 
 
 def _add_distances(tally: NDArray[np.void], columns: Columns) -> None:

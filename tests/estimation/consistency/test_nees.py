@@ -15,6 +15,7 @@ from estimation.consistency.nees import (
     nees_limits,
     normalised,
     samples_of_runs,
+    squared_sum,
 )
 
 TAIL = 0.5 * (1.0 - CONFIDENCE)
@@ -103,3 +104,6 @@ def test_errors_without_deviations_or_truth_are_left_out() -> None:
     sd = np.array([2.0, 1.0, 0.0, math.nan, 10.0])
     np.testing.assert_array_equal(normalised(error, sd), [0.5, 0.5])
     np.testing.assert_array_equal(normalised(error[:1], sd[:1]), [0.5])
+    assert squared_sum(error, sd) == (0.5, 2)
+    assert squared_sum(error[:1], sd[:1]) == (0.25, 1)
+    assert squared_sum(error[1:2], sd[1:2]) == (0.0, 0)

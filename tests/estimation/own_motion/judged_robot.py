@@ -52,9 +52,10 @@ class JudgedRobot:
         drive: Callable[[float], Motion] = wavy,
         sample_ns: int = 32 * MS,
         late_s: float = 0.0,
+        noise: float = 1.0,
     ) -> None:
         self.random = np.random.default_rng([seed, 17])
-        self.drive, self.sample_ns, self.late_s = drive, sample_ns, late_s
+        self.drive, self.sample_ns, self.late_s, self.noise = drive, sample_ns, late_s, noise
         self.check: OdometryCheck = UNCHECKED
         self.own, self.ring = plain_rows_of(OwnPoint, 256), EMPTY
         self.ways = plain_rows_of(WayEntry, 64)
@@ -86,7 +87,7 @@ class JudgedRobot:
 
     def _frame(self) -> None:
         """A frame is captured, and the one that was on its way arrives."""
-        x, y, theta = (self.random.standard_normal(3) * [3e-4, 3e-4, 3.5e-3]).tolist()
+        x, y, theta = (self.noise * self.random.standard_normal(3) * [3e-4, 3e-4, 3.5e-3]).tolist()
         shown = Pose(self.pose.x + x, self.pose.y + y, self.pose.theta + theta)
         self.frames.append((self.at_ns, shown))
         while self.frames and self.frames[0][0] <= self.at_ns - LATENCY_NS:

@@ -130,3 +130,10 @@ def test_the_way_of_an_arc_is_that_of_its_motion(v: float, u: float) -> None:
     way = way_between(start, advance(start, v, u, 0.5))
     assert way.v == pytest.approx(0.5 * v, abs=1e-12)
     assert way.u == pytest.approx(math.remainder(0.5 * u, 2.0 * math.pi), abs=1e-12)
+
+
+@pytest.mark.parametrize("factor", [3.0, 10.0])
+def test_noise_that_nobody_told_refutes_no_odometry(factor: float) -> None:
+    robot = JudgedRobot(noise=factor)
+    assert all(check.by_twist.trusted for check in robot.run(20.0))
+    assert robot.check.heading_noise == pytest.approx(factor * factor, rel=0.6)

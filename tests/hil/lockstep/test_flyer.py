@@ -76,6 +76,11 @@ CASES = [
         ["estimator.kind=difference", program("table", t=[0.2, 1.0], v=[0.05, 0.1], u=[0.0, 0.6])],
     ),
     ("turtlebot3", ["estimator.kind=difference", "controller.law=feedforward", *LATE, *BODY]),
+    # A leader that drives backwards, turns back, and stands.
+    (
+        "turtlebot3",
+        [program("table", t=[0, 1, 1.5, 2, 2.1], v=[-0.1, -0.1, 0.1, 0.1, 0], u=[0, 0, 0.5, 0, 0])],
+    ),
     (
         "turtlebot3",
         ["mocap.clock_offset_s=0.03", "mocap.clock_drift_ppm=200", "estimator.stamp_offset_s=0.01"],

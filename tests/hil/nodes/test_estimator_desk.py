@@ -4,6 +4,7 @@ import pytest
 
 from controllers.guard import CLOCK_TOLERANCE_NS
 from estimation.consistency.noise_estimate import NOISE_AS_TOLD, NoiseScale, kept_noise
+from estimation.consistency.process_estimate import NOTHING_LEARNED
 from estimation.own_motion.odometry_check import UNCHECKED
 from estimation.own_motion.odometry_history import Correction
 from formation.records import load, store
@@ -44,16 +45,22 @@ def test_at_the_begin_nothing_is_noted() -> None:
 def test_tracks_and_odometry_lie_where_they_are_named() -> None:
     desk = memory().desk
     found = desk.memory()
-    assert all(a is b for a, b in zip(found, (desk.points, desk.history, desk.own, desk.ways), strict=True))
-    assert Memory._fields == ("points", "history", "own", "ways")
+    assert all(
+        a is b
+        for a, b in zip(found, (desk.points, desk.history, desk.own, desk.ways, desk.bank), strict=True)
+    )
+    assert Memory._fields == ("points", "history", "own", "ways", "bank")
 
 
 LEARNED = NOISE_AS_TOLD._replace(scale=NoiseScale(2.0, 3.0, 4.0, 5.0), gated=True)
 
 
+PROCESS = NOTHING_LEARNED._replace(speed=0.5, turn=2.0)
+
+
 def filled(desk: Desk) -> Known:
     check = UNCHECKED._replace(heard=True, resets=1)
-    known = Known(Ring(1, 2), Ring(3, 4), Ring(5, 6), Correction(0.01, 0.1, 0.2), check, 7, LEARNED)
+    known = Known(Ring(1, 2), Ring(3, 4), Ring(5, 6), Correction(0.01, 0.1, 0.2), check, 7, LEARNED, PROCESS)
     store(desk.known, 0, known)
     return known
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from estimation.consistency.noise_estimate import NoiseLearning
+from estimation.consistency.process_estimate import ProcessLearning
 from estimation.filters.belief import Model
 from estimation.filters.estimators import settling
 from estimation.filters.filter import Kind, filter_of
@@ -64,17 +65,19 @@ class Sent(NamedTuple):
 
 def rules(kind: Kind, front_end: FrontEnd, source: int) -> Rules:
     """As the node has them for a scenario."""
-    settled = settling(kind.name.lower())
+    settled, noise = settling(kind.name.lower()), ProcessNoise.by_rule(LIMITS, 0.5)
+    learns = kind is not Kind.DIFFERENCE
     return Rules(
-        TrackSettings(**settled._asdict()),
-        filter_of(kind, Model(front_end, LIMITS, ProcessNoise.by_rule(LIMITS, 0.5))),
+        TrackSettings(**settled._asdict(), notices_manoeuvres=learns),
+        filter_of(kind, Model(front_end, LIMITS, noise)),
         source,
         kind is not Kind.DIFFERENCE and source != MOCAP,
         2.0,
         NOISE,
         InputTrust(5e-3, 3e-2, delay=0.004, lag=0.03, v_max=0.2, u_max=0.6),
         OwnNoise(NOISE, 0.2, 0.6),
-        NoiseLearning(kind is not Kind.DIFFERENCE, NOISE, 0.04),
+        ProcessLearning(learns, noise, LIMITS.k_v * LIMITS.k_v, LIMITS.k_u * LIMITS.k_u),
+        noise_learning=NoiseLearning(kind is not Kind.DIFFERENCE, NOISE, 0.04),
     )
 
 
@@ -141,6 +144,7 @@ class Estimator:
             desk.own,
             desk.history,
             desk.ways,
+            desk.bank,
             desk.known,
             desk.newest,
             desk.notes,

@@ -245,6 +245,19 @@ def test_a_topic_that_holds_rubbish_only_is_named(topic: str, said: str, tmp_pat
         replay_foreign(read_log(tmp_path / "bad.mcap"), load_topic_map(str(chart(tmp_path, POSES))))
 
 
+@pytest.mark.parametrize("named", [True, False])
+@pytest.mark.parametrize("source", ["auto", "mocap"])
+def test_a_bag_without_odometry_gives_the_leaders_motion_all_the_same(
+    named: bool, source: str, tmp_path: Path
+) -> None:
+    log = bag(tmp_path, [each for each in lab() if each.topic not in ("/tb2/odom", "/tb2/twist")])
+    text = POSES if named else POSES.replace('odometry = "/tb2/odom"', "")
+    played = replay_foreign(
+        log, load_topic_map(str(chart(tmp_path, text)), None, None, [f"estimator.own_motion={source}"])
+    )
+    assert played.estimates[-1].v1 == pytest.approx(V1, abs=0.01)
+
+
 SIGHTINGS = """
 [topics]
 odometry = "/tb2/odom"
@@ -302,7 +315,9 @@ def test_a_type_that_is_told_stands_for_the_logs_own(tmp_path: Path) -> None:
     log = bag(tmp_path, sighting_lab("PointStamped"))
     entry = '{ topic = "/tb2/leader", type = "geometry_msgs/msg/Twist" }'
     mapped = load_topic_map(str(chart(tmp_path, sightings_map(entry))))
-    with pytest.raises(UsageError, match=r"'/tb2/leader' is geometry_msgs/msg/Twist, expected .*PointStamped"):
+    with pytest.raises(
+        UsageError, match=r"'/tb2/leader' is geometry_msgs/msg/Twist, expected .*PointStamped"
+    ):
         replay_foreign(log, mapped)
 
 
