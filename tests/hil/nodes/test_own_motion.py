@@ -26,11 +26,12 @@ WRONG = Motion(0.3, -0.5)
 
 
 def node_with(source: str, front_end: str = "world") -> EstimatorNode:
-    # The noise of late frames is not learned from: what they are folded in with depends on the order.
+    # Noise is learned from frames in order alone: what late ones are folded in with depends on the order.
     overrides = [
         f"estimator.own_motion={source}",
         f"estimator.front_end={front_end}",
         "estimator.noise=given",
+        "estimator.process_noise=given",
     ]
     return EstimatorNode(load_scenario("turtlebot3", overrides))
 
