@@ -33,8 +33,9 @@ def followed_leader(
 ) -> Followed:
     """Belief of a point moved on to a measurement, and with that taken in unless its NIS is above ``gate``.
 
-    ``way``: the follower's mean motion in between. ``notices``: whether process noise is raised for a leader that changes its motion at once. What a frame
-    check has refused, by a negative gate, says nothing of manoeuvres.
+    ``way``: the follower's mean motion in between. ``notices``: whether process noise is raised for a leader
+    that changes its motion at once. What a frame check has refused, by a negative gate, says nothing of
+    manoeuvres.
     """
     dt = (measurement.capture_ns - last.measurement.capture_ns) * _NS
     if not notices:
