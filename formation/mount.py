@@ -21,19 +21,20 @@ class Mount(NamedTuple):
     y: float
     yaw: float
 
-    @kernel
-    def is_none(self) -> bool:
-        """Whether the body's axes are the robot's."""
-        return self.x == 0.0 and self.y == 0.0 and self.yaw == 0.0
-
 
 NO_MOUNT = Mount(0.0, 0.0, 0.0)
 
 
 @kernel
+def is_aligned(mount: Mount) -> bool:
+    """Whether the body's axes are the robot's."""
+    return mount.x == 0.0 and mount.y == 0.0 and mount.yaw == 0.0
+
+
+@kernel
 def body_pose(robot: Pose, mount: Mount) -> Pose:
     """Pose of the body on a robot: the robot's pose, then the mount."""
-    if mount.is_none():
+    if is_aligned(mount):
         return robot
     cos, sin = math.cos(robot.theta), math.sin(robot.theta)
     return Pose(
@@ -46,7 +47,7 @@ def body_pose(robot: Pose, mount: Mount) -> Pose:
 @kernel
 def robot_pose(body: Pose, mount: Mount) -> Pose:
     """Pose of the robot under a body."""
-    if mount.is_none():
+    if is_aligned(mount):
         return body
     theta = wrapped(body.theta - mount.yaw)
     cos, sin = math.cos(theta), math.sin(theta)

@@ -28,7 +28,7 @@ _PLACE, _VELOCITY = slice(0, 2), slice(2, 4)
 
 
 class FlyingFilter(NamedTuple):
-    """A filter as it flies: sd of a position [m] per axis, time between frames [s], noise, limits."""
+    """A filter as it flies: sd of a position per axis [m], period of frames [s], noise, leader's limits."""
 
     sigma: float
     period: float
@@ -100,7 +100,7 @@ def response(dynamics: ErrorDynamics, bounds: Disturbances) -> Responses:
 
 
 def _worst(weights: FloatArray) -> FloatArray:
-    """Per direction the sum of the weights' sizes, for weights (n, 2, 2) on vectors; above all between.
+    """Per direction the sum of the sizes of weights (n, 2, 2) on vectors; safely above all between.
 
     A direction between two of the grid is at most half a step away from one: the sum is the length of a
     convex combination of theirs, and so at most theirs over the cosine of half a step.

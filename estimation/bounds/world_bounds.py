@@ -42,7 +42,7 @@ class PositionBounds(NamedTuple):
 
 
 class PositionErrors(NamedTuple):
-    """Bounds of the errors of the leader's speed and velocity [m/s], and of the line between both [m]."""
+    """Bounds of the errors of the leader's speed and velocity [m/s], and of the line to it [m]."""
 
     speed: float
     velocity: float
@@ -65,8 +65,8 @@ def position_errors(seen: Moment, window: WindowVelocity, known: PositionBounds)
 @kernel
 def world_bounds_at(seen: Moment, errors: PositionErrors, law: LawConstants) -> MomentBounds:
     """Bounds of v1, alpha1 and h of one moment; of h infinite where the line's error reaches rho."""
-    gap, rho, lo = errors.velocity, seen.rho, seen.rho - errors.line
-    turned = subtended(gap, seen.v1, law.v_eps)
+    wrong, rho, lo = errors.velocity, seen.rho, seen.rho - errors.line
+    turned = subtended(wrong, seen.v1, law.v_eps)
     if not lo > 0.0:
         return MomentBounds(errors.speed, math.pi, math.inf)
     tilted = math.asin(errors.line / rho)
@@ -76,15 +76,15 @@ def world_bounds_at(seen: Moment, errors: PositionErrors, law: LawConstants) -> 
     f_hi = restoring(rho + errors.line, law.rho_0, law.mu_rho)
     f = max(abs(f_lo), abs(f_hi))
     change = cosine_change(off, turned)
-    apart = gap / lo + law.mu1 * change + f * errors.speed
+    apart = wrong / lo + law.mu1 * change + f * errors.speed
     if turned < 0.5 * math.pi and seen.v1 > 0.0:
         along = 1.0 / lo + f
         least = abs(math.cos(seen.alpha1)) + cosine_change(seen.alpha1, turned)
         across = min(least, 1.0) / lo + law.mu1 / seen.v1
         second = (1.0 - math.cos(turned)) * (f * seen.v1 + law.mu1 * min(abs(math.cos(off)) + change, 1.0))
-        apart = min(apart, gap * math.sqrt(along * along + across * across) + second)
+        apart = min(apart, wrong * math.sqrt(along * along + across * across) + second)
     stretch = errors.line / lo
-    tilt = 2.0 * math.sin(0.5 * tilted) * ((seen.v1 + gap) / lo + law.mu1)
+    tilt = 2.0 * math.sin(0.5 * tilted) * ((seen.v1 + wrong) / lo + law.mu1)
     spaced = seen.v1 * (max(f_hat - f_lo, f_hi - f_hat) + stretch * abs(f_hat))
     h = apart + tilt + law.mu1 * stretch * abs(math.cos(off)) + spaced
     return MomentBounds(errors.speed, min(turned + tilted, math.pi), h)

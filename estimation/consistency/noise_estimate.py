@@ -6,8 +6,8 @@ its jerk times the cube of the spacing over 4.5: micrometres at 100 frames a sec
 millimetre at ten. So they tell noise from manoeuvres without knowing any model of either.
 
 Noise that one frame shares with the next, as filtered or shaking markers have it, is missing in them.
-Therefore the same differences are taken over strides of some 50 ms as well. Over these a speed step is as large as
-noise is, so that they can keep the scale from falling below one, and no more.
+Therefore the same differences are taken over strides of some 50 ms as well. Over these a speed step is as
+large as noise is, so that they can keep the scale from falling below one, and no more.
 
 Noise is that of bodies that move; who stands is quieter, and isn't asked.
 
@@ -33,6 +33,7 @@ REFUTED = 1.3
 _NS = 1e-9
 STRIDE_NS = 47_000_000  # no multiple of a usual spacing of frames, so that a microsecond doesn't matter
 LONGEST_NS = 520_000_000  # four positions further apart tell more of the motion than of the noise
+_ANOTHER = 1.3  # factor between two scales from which on they don't agree
 _LEAST_LEFT = 0.05  # of an innovation after the update; what leaves less tells nothing of the noise
 _HALF_TRACK = 0.1  # by which a turn rate is the speed of a wheel [m]
 
@@ -92,7 +93,8 @@ class NoiseEstimate(NamedTuple):
     """All that is known of the noise.
 
     scale: what measurements are taken with now. frames, strides: neighbouring frames, and frames some
-    50 ms apart. gated: whether the newest frame or sighting wasn't believed.
+    50 ms apart. gated: whether the newest frame or sighting wasn't believed. basis: scale of positions that
+    what is learned of the leader's driving rests on.
     """
 
     scale: NoiseScale
@@ -102,6 +104,7 @@ class NoiseEstimate(NamedTuple):
     frames: Moments
     strides: Moments
     gated: bool
+    basis: float
 
 
 class Weights(NamedTuple):
@@ -123,6 +126,7 @@ NOISE_AS_TOLD = NoiseEstimate(
     _NO_MOMENTS,
     _NO_MOMENTS,
     gated=False,
+    basis=1.0,
 )
 """What is known of the noise before any frame."""
 
@@ -168,7 +172,16 @@ def noise_with_frame(
         heading=certain_scale(by_frame.heading, by_stride.heading),
     )
     frames = _pushed(estimate.frames, moment)
-    return NoiseEstimate(scale, by_frame, by_stride, estimate.sight, frames, strides, gated)
+    return estimate._replace(
+        scale=scale, by_frame=by_frame, by_stride=by_stride, frames=frames, strides=strides
+    )
+
+
+@kernel
+def is_another(estimate: NoiseEstimate) -> bool:
+    """Whether the noise of positions is another one than what was learned of the leader rests on."""
+    scale, basis = estimate.scale.position, estimate.basis
+    return scale > _ANOTHER * basis or basis > _ANOTHER * scale
 
 
 @kernel(inline=False)

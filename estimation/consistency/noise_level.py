@@ -12,12 +12,15 @@ LEAST_SCALE, MOST_SCALE = 0.1, 30.0
 
 CLIP = 2.25  # variances that a square counts for at the most: outliers and speed steps are few
 CLIPPED_MEAN = 0.7785  # of the square of a standard normal that is cut off there
-_BEGIN = 4.0  # differences that what is told counts as
-_QUICK, _SLOW = 64.0, 1000.0  # differences that the two means reach back
+_SLOPE = (
+    0.614  # of that mean, relatively, by the variance: steps are larger by this, so that errors fade as 1/n
+)
+_BEGIN = 6.0  # differences that what is told counts as
+_QUICK, _SLOW = 100.0, 1600.0  # differences that the two means reach back
 _CHANGED = 2.2  # factor between the two variances, some four deviations, by which the noise has changed
-_ANEW = 32.0  # differences that it then counts as
+_ANEW = 50.0  # differences that it then counts as
 _VARIANCE = 6.0  # of a mean over n, times n: 2 of squares, 2.3 as differences overlap, 1.3 as they are cut
-_SURE = 2.0  # standard deviations by which the noise must differ from what is told
+_SURE = 2.5  # standard deviations by which the noise must differ from what is told
 
 
 class Level(NamedTuple):
@@ -60,7 +63,7 @@ def _mean_with(mean: float, square: float, predicted: float, weight: float) -> f
     expected = mean + predicted
     news = (min(square / expected, CLIP) / CLIPPED_MEAN - 1.0) * mean / expected
     most, least = MOST_SCALE * MOST_SCALE, LEAST_SCALE * LEAST_SCALE
-    return min(most, max(least, mean * (1.0 + news / weight)))
+    return min(most, max(least, mean * (1.0 + news / (_SLOPE * weight))))
 
 
 @kernel

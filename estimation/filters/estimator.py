@@ -129,6 +129,10 @@ class Interpreted:
         """See :meth:`Estimator.update`."""
         return _remembering(self.estimator.update(whole_of(belief), measurement))
 
+    def widened(self, belief: Gaussian, by: float) -> Gaussian:
+        """Itself; see :meth:`~estimation.filters.filter.Filter.widened`."""
+        return belief
+
     def leader(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
         """See :meth:`~estimation.filters.filter.Filter.leader`; no lever arm is known of here."""
         return belief

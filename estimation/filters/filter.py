@@ -13,9 +13,9 @@ from typing import NamedTuple
 from estimation.filters.belief import Model
 from estimation.filters.difference import differenced, first_difference
 from estimation.filters.ekf import extended_moved, informed, mean_of, seen_by_follower
-from estimation.filters.gaussian import Gaussian, nis_of, started
+from estimation.filters.gaussian import Gaussian, nis_of, started, widened
 from estimation.filters.leader_prior import standing_noise, within_limits
-from estimation.filters.lever_arm import NO_LEVER, Lever, robot_under, swung
+from estimation.filters.lever_arm import NO_LEVER, Lever, is_centred, robot_under, swung
 from estimation.filters.ukf import unscented_moved
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, moved
 from estimation.models.measurement import FrontEnd, Measurement
@@ -81,11 +81,9 @@ class Filter(NamedTuple):
     def predict(self, belief: Gaussian, dt: float, follower: FollowerMotion) -> Gaussian:
         """Belief after dt [s], the follower having moved as given."""
         noise = self.noise if self.in_world else standing_noise(belief, self.noise)
-        if self.kind == UKF:
-            ahead = unscented_moved(belief, dt, noise)
-        else:
-            ahead = extended_moved(belief, dt, noise)
-        if not self.lever.vanishes():
+        unscented = self.kind == UKF
+        ahead = unscented_moved(belief, dt, noise) if unscented else extended_moved(belief, dt, noise)
+        if not is_centred(self.lever):
             ahead = swung(ahead, belief, self.lever, self.limits.v_eps, noise.q_u, dt)
         if self.kind == DIFFERENCE:
             rates = belief.rates
@@ -104,9 +102,14 @@ class Filter(NamedTuple):
         return informed(belief, measurement.x, measurement.y, measurement.spread)
 
     @kernel
+    def widened(self, belief: Gaussian, by: float) -> Gaussian:
+        """Belief whose measurements turn out to have had errors of a larger variance, by a factor."""
+        return widened(belief, by, self.limits)
+
+    @kernel
     def leader(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
         """Belief about the leader itself, the newest measurement being given; sightings see no body."""
-        if self.lever.vanishes() or not measurement.framed:
+        if is_centred(self.lever) or not measurement.framed:
             return belief
         return robot_under(belief, self.lever, self.limits.v_eps)
 

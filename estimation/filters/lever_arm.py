@@ -23,13 +23,14 @@ class Lever(NamedTuple):
     x: float
     y: float
 
-    @kernel
-    def vanishes(self) -> bool:
-        """Whether the body sits above the middle of the wheel axis."""
-        return self.x == 0.0 and self.y == 0.0
-
 
 NO_LEVER = Lever(0.0, 0.0)
+
+
+@kernel
+def is_centred(lever: Lever) -> bool:
+    """Whether the body sits above the middle of the wheel axis."""
+    return lever.x == 0.0 and lever.y == 0.0
 
 
 class Change(NamedTuple):

@@ -28,8 +28,8 @@ class ProcessNoise(NamedTuple):
     ``q_v`` [m^2/s^3] drives the speed, ``q_u`` [rad^2/s^3] the turn rate. ``v_eps`` [m/s] is the speed below
     which the direction of motion is not trusted, so that the noise of w becomes isotropic. A leader slower
     than that stands or sets off, which the model of steady driving knows nothing of: there w is driven by up
-    to ``q_start`` [m^2/s^3] more. ``q_across`` [m^2/s^3] is the most that is isotropic otherwise: jumps of the
-    speed say nothing of the direction.
+    to ``q_start`` [m^2/s^3] more. ``q_across`` [m^2/s^3] is the most that is isotropic otherwise: jumps of
+    the speed say nothing of the direction.
     """
 
     q_v: float

@@ -1,9 +1,9 @@
-"""The follower's motion from one measurement to the next: odometry added up over all its samples in between.
+"""The follower's motion from one measurement to the next: odometry added up over all samples in between.
 
-Between slow sightings the motion at both ends tells little of what came in between. The signal, linear between
-samples, is integrated over the very interval, shifted by its delay. Of a further lag only a limit is known:
-every delay up to it is as likely as any other, so that the mean over some of them is taken, and what they
-differ by is what the lag may do.
+Between slow sightings the motion at both ends tells little of what came in between. The signal, linear
+between samples, is integrated over the very interval, shifted by its delay. Of a further lag only a limit is
+known: every delay up to it is as likely as any other, so that the mean over some of them is taken, and what
+they differ by is what the lag may do.
 """
 
 from __future__ import annotations

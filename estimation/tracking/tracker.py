@@ -78,7 +78,8 @@ class TrackSettings(NamedTuple):
 
     gate_probability: share of good measurements that pass a chi-square gate.
     reacquire_frames: rejected measurements that must agree with each other before they take over.
-    coast_after, lost_after, window: [s]; a track of slow measurements has some of their intervals. jump_uncertain_for: how long [s] a jump stays uncertain.
+    coast_after, lost_after, window: [s]; a track of slow measurements has some of their intervals.
+    jump_uncertain_for: how long [s] a jump stays uncertain.
     settled_heading, unsettled_heading: standard deviation of the leader's direction [rad] below which a track
     settles, and above which it no longer counts as settled.
     capped_speed: whether a leader that seems faster than k_v settles as one of k_v would.

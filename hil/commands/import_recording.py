@@ -27,6 +27,8 @@ def import_table(recording: Path, chart: str, out: Path) -> None:
     from hil.recordings.csv_import import import_csv
 
     done = import_csv(recording, load_column_map(chart), out)
+    if done.torn:
+        click.echo(f"{recording}: line {done.torn} is cut off; it is left out", err=True)
     click.echo(
         f"{out}: {done.rows} rows from {done.from_s:g} s to {done.to_s:g} s; "
         f"go on with: abreast replay {out}",
@@ -55,8 +57,9 @@ def import_mrclam_pair(
     from hil.recordings.mrclam_import import import_mrclam
 
     done = import_mrclam(folder, leader, follower, out, sightings)
+    kind = "frames" if sightings == "vicon" else "sightings"
     click.echo(
-        f"{out}: {done.rows} {'frames' if sightings == 'vicon' else 'sightings'} from {done.from_s:.3f} s to {done.to_s:.3f} s; "
+        f"{out}: {done.rows} {kind} from {done.from_s:.3f} s to {done.to_s:.3f} s; "
         f"go on with: abreast replay {out}",
         err=True,
     )

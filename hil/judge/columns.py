@@ -59,7 +59,7 @@ class EstimateColumns:
 
     @staticmethod
     def of_rows(rows: NDArray[np.void]) -> EstimateColumns:
-        """Columns of rows of :class:`hil.replay.kept_rows.EstimateRow`, views but deviations and bounds."""
+        """Columns of rows of :class:`hil.replay.kept_rows.EstimateRow`, deviations and bounds copied."""
         return EstimateColumns(
             capture_ns=rows["capture_ns"],
             status=rows["status"],

@@ -5,20 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from estimation.consistency.noise_estimate import REFUTED
+from estimation.bounds.certified import Failed
+from hil.nodes.noise_report import is_refuted
 
-FAILED = "noise"
-"""Name of the assumption that fails."""
+_FAILED = Failed.NOISE.value
 
 
 def judge_noise(scale: float | None) -> dict[str, float]:
     """The ``noise`` part of a summary: ``scale``, of positions, found over told; empty where it is given."""
     return {} if scale is None else {"scale": scale}
-
-
-def is_refuted(scale: float | None) -> bool:
-    """Whether what was told of the noise is refuted, and with it all bounds that rest on it."""
-    return scale is not None and scale > REFUTED
 
 
 def supported(certificate: Mapping[str, Any], scale: float | None) -> Mapping[str, Any]:
@@ -34,7 +29,7 @@ def certain(certified: Mapping[str, Any], scale: float | None) -> Mapping[str, A
     if not is_refuted(scale) or not certified:
         return certified
     failed = dict(certified["failed"])
-    failed[FAILED] = failed.get(FAILED, 0) + certified["certified"]
+    failed[_FAILED] = failed.get(_FAILED, 0) + certified["certified"]
     return {"certified": 0, "failed": failed, "v1": {}, "alpha1": {}}
 
 

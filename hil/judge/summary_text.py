@@ -210,7 +210,7 @@ def _estimation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     low = {
         name: share
         for name, share in estimation.get("coverage_3sigma", {}).items()
-        if name in ("v1", "alpha1") and share < LEAST_COVERAGE
+        if name in ("v1", "alpha1", "u1") and share < LEAST_COVERAGE
     }
     for name, share in low.items():
         yield f"the estimator is too sure of {name}: only {share:.1%} of errors within 3 standard deviations"

@@ -197,7 +197,7 @@ def _seen(
 ) -> int:
     """The k-th estimator takes in its pair; the number of estimates on their way."""
     rules, tracks = load(Rules, rooms.rules, k), tracks_of(rooms, plan.share, k)
-    seen = estimator_step.with_robot(seen, rules.mount)
+    seen = estimator_step.with_robot(seen, rules.mounts)
     taken = estimator_step.take_frame(load(Known, rooms.knowns, k), tracks, rules, capture_ns, seen)
     store(rooms.knowns, k, taken.known)
     if taken.verdict in (DUPLICATE, LATE):

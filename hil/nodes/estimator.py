@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
+from estimation.bounds.certified import Certain, Failed
 from estimation.own_motion.odometry_correction import (
     NOTHING_SEEN,
     OdometryComparison,
@@ -24,8 +25,9 @@ from hil.nodes.estimator_step import AUTO, MOCAP, Known, is_under_way
 from hil.nodes.findings import Findings, named_findings
 from hil.nodes.frame_time import clock_report
 from hil.nodes.leader_findings import leader_findings
+from hil.nodes.mount_report import mount_findings, mount_problem, mount_report
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
-from hil.nodes.noise_report import noise_findings, noise_report, scale_of
+from hil.nodes.noise_report import is_refuted, noise_findings, noise_report, scale_of
 from hil.nodes.odometry_findings import odometry_findings
 from hil.nodes.process_report import process_report
 from hil.nodes.sensor_offsets import offsets_report
@@ -204,7 +206,9 @@ class EstimatorNode:
         if self.certifying is None:
             return (estimate,)
         newest = load(Estimate, state.memory.desk.newest, 0)
-        certain = self.certifying.certain(state.believed, state.memory.history, capture_ns)
+        certain: Certain | Failed = Failed.NOISE
+        if not is_refuted(state.noise_scale):
+            certain = self.certifying.certain(state.believed, state.memory.history, capture_ns)
         certified = certified_message(newest, certain, now_ns, self.topics.follower)
         return estimate, outgoing(self.topics.certified, certified, capture_ns)
 
@@ -222,7 +226,9 @@ class EstimatorNode:
         """Diagnostics: status of the track, inputs taken and refused."""
         known = state.memory.known
         problem = "" if is_under_way(known, self.rules.step) else self._missing(known)
+        problem = problem or mount_problem(known.mount_check, stops=self.rules.step.mounts.stops)
         values: dict[str, object] = {"status": state.memory.status(now_ns).name.lower()}
+        values |= mount_report(known.mount_check)
         values |= clock_report(state.times, state.memory.desk.time)
         values |= (
             offsets_report(state.memory.track[-1].belief)
@@ -244,9 +250,9 @@ class EstimatorNode:
         A replay in one pass asks too, and has loaded none of the node's own steps.
         """
         known, rules = state.memory.known, self.rules.step
-        noise = noise_findings(known.noise, rules.noise_learning)
-        found = odometry_findings(known, rules, now_ns) | noise
-        return found | leader_findings(known.travel, now_ns)
+        found = {**mount_findings(known.mount_check), **odometry_findings(known, rules, now_ns)}
+        found |= noise_findings(known.noise, rules.noise_learning)
+        return {**found, **leader_findings(known.travel, now_ns)}
 
     def _missing(self, known: Known) -> str:
         """What the estimator waits for to begin."""

@@ -13,6 +13,7 @@ from estimation.own_motion.odometry_history import IDEAL, MotionSample
 from estimation.own_motion.own_track import OwnPoint
 from estimation.time.host_time import NO_TIME_YET, HostTime, TimeRows
 from estimation.tracking.estimate import Estimate
+from estimation.tracking.mount_check import NO_MOUNT_CHECK
 from estimation.tracking.track_point import TrackPoint
 from estimation.tracking.travel_watch import NO_TRAVEL
 from formation.kernel import kernel
@@ -121,7 +122,18 @@ def noted(desk: Desk, digest: int, now_ns: int) -> bool:
     return now_ns >= notes.heard_ns - CLOCK_TOLERANCE_NS
 
 
-NOTHING_KNOWN = Known(EMPTY, EMPTY, EMPTY, IDEAL, UNCHECKED, 0, NOISE_AS_TOLD, NOTHING_LEARNED, NO_TRAVEL)
+NOTHING_KNOWN = Known(
+    track=EMPTY,
+    odometry=EMPTY,
+    own=EMPTY,
+    correction=IDEAL,
+    odometry_check=UNCHECKED,
+    watched_ns=0,
+    noise=NOISE_AS_TOLD,
+    process=NOTHING_LEARNED,
+    travel=NO_TRAVEL,
+    mount_check=NO_MOUNT_CHECK,
+)
 
 
 @kernel

@@ -132,7 +132,7 @@ def frame_seen(desk: Desk, payload: bytes, names: bytes, again: bool, digest: in
         count(desk.counts, SAME_PLACE)
         return came
     body = Pose(frame.follower_x, frame.follower_y, frame.follower_theta)
-    seen = step.with_robot(PairSeen(frame.leader_x, frame.leader_y, body), rules.step.mount)
+    seen = step.with_robot(PairSeen(frame.leader_x, frame.leader_y, body), rules.step.mounts)
     store(desk.frame, 0, TimedFrame(timed.capture_ns, seen))
     return came + SEEN
 

@@ -37,7 +37,7 @@ from hil.nodes.estimator_desk import (
     SensorRules,
     TimedFrame,
 )
-from hil.nodes.estimator_step import AUTO, FUSED, MOCAP, ODOMETRY, Known, Rules, Told, estimate
+from hil.nodes.estimator_step import AUTO, FUSED, MOCAP, ODOMETRY, Known, MountRules, Rules, Told, estimate
 from hil.nodes.frame_time import time_rules
 from hil.nodes.node import Counts
 from hil.nodes.refusals import COUNTED, REFUSALS, TAKEN, TAKEN_FRAME
@@ -94,8 +94,8 @@ def rules_of(scenario: Scenario) -> Rules:
         trust=input_trust(scenario),
         own_noise=own_noise(scenario),
         noise_learning=noise_learning(scenario),
-        mount=follower_mount(scenario),
         process_learning=process_learning(scenario),
+        mounts=MountRules(follower_mount(scenario), scenario.controller.mount_check == "stop"),
     )
 
 

@@ -13,11 +13,13 @@ from estimation.consistency.noise_estimate import (
     Moment,
     NoiseEstimate,
     NoiseLearning,
+    is_another,
     noise_with_frame,
     noise_with_sighting,
     scaled_noise,
 )
 from estimation.consistency.process_estimate import (
+    MEMBERS,
     LearnedProcess,
     Member,
     ProcessLearning,
@@ -71,11 +73,15 @@ from estimation.own_motion.own_track import (
     own_reprocessed,
 )
 from estimation.tracking.estimate import Estimate, estimate_at, guessed_when_slow
-from estimation.tracking.follower_check import BELIEVED
+from estimation.tracking.follower_check import BELIEVED, MOUNT
 from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
 from estimation.tracking.follower_check import GATED as LEADER_OFF
+from estimation.tracking.mount_check import MountCheck, is_off
+from estimation.tracking.mount_check import watched as mount_watched
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE, RESTARTED, USED, TrackPoint
 from estimation.tracking.tracker import (
+    REJECTING,
+    TRACKING,
     TrackSettings,
     add,
     capture_at,
@@ -89,7 +95,7 @@ from estimation.tracking.tracker import (
 from estimation.tracking.travel_watch import TravelWatch, watched
 from formation.kernel import kernel
 from formation.mount import NO_MOUNT, Mount, robot_pose
-from formation.records import Rows, store
+from formation.records import Rows, load, store
 from formation.ring import Ring, place
 
 _NS = 1e-9
@@ -98,11 +104,21 @@ ODOMETRY, MOCAP, FUSED, AUTO = 0, 1, 2, 3
 """Where the follower's motion is known from; AUTO: from odometry while nothing speaks against it."""
 
 
+class MountRules(NamedTuple):
+    """Where the follower's body sits, and whether it is stopped if that is plainly wrong."""
+
+    follower: Mount
+    stops: bool
+
+
+NO_MOUNT_RULES = MountRules(NO_MOUNT, stops=False)
+
+
 class Rules(NamedTuple):
     """All that is fixed about an estimator.
 
     source: where the follower's motion is from. reprocesses: whether odometry that comes late is folded in
-    again. span: seconds of odometry kept. noise: of a mocap pose. mount: of the follower's
+    again. span: seconds of odometry kept. noise: of a mocap pose. mounts: of the follower's
     body. noise_learning: by what the noise is put right.
     """
 
@@ -115,7 +131,7 @@ class Rules(NamedTuple):
     trust: InputTrust
     own_noise: OwnNoise
     process_learning: ProcessLearning
-    mount: Mount = NO_MOUNT
+    mounts: MountRules = NO_MOUNT_RULES
     noise_learning: NoiseLearning = NOISE_GIVEN
 
 
@@ -138,7 +154,7 @@ class Known(NamedTuple):
 
     ``watched_ns``: capture of the first frame since when odometry is missed, 0 before. ``noise``: of
     measurements, as they tell it. ``process``: what is known of how the leader drives. ``travel``: which
-    way the leader went, where it is seen in the world.
+    way the leader went, where it is seen in the world. ``mount_check``: what is left of the follower's mount.
     """
 
     track: Ring
@@ -150,6 +166,7 @@ class Known(NamedTuple):
     noise: NoiseEstimate
     process: LearnedProcess
     travel: TravelWatch
+    mount_check: MountCheck
 
 
 class Taken(NamedTuple):
@@ -169,12 +186,12 @@ class Told(NamedTuple):
 
 
 @kernel
-def with_robot(seen: PairSeen, mount: Mount) -> PairSeen:
+def with_robot(seen: PairSeen, rules: MountRules) -> PairSeen:
     """What a frame shows, with the follower's own pose in the place of its body's.
 
     The leader's stays its body's, which only the filter knows how to tell from the leader.
     """
-    return seen._replace(follower=robot_pose(seen.follower, mount))
+    return seen._replace(follower=robot_pose(seen.follower, rules.follower))
 
 
 @kernel
@@ -271,15 +288,41 @@ def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen
 
     It is taken with the noise as known from the frames before, and keeps that if it is folded again.
     """
-    if not rules.noise_learning.learns:
-        return _take_frame(known, memory, rules, capture_ns, seen)
-    noise = scaled_noise(rules.noise, known.noise)
-    taken = _take_frame(known, memory, with_noise(rules, noise), capture_ns, seen)
+    learns = rules.noise_learning.learns
+    using = with_noise(rules, scaled_noise(rules.noise, known.noise)) if learns else rules
+    taken = _take_frame(known, memory, using, capture_ns, seen)
     if taken.late or taken.verdict == DUPLICATE or taken.verdict == LATE:
         return taken
-    gated = taken.cause != BELIEVED
-    learned = noise_with_frame(known.noise, Moment(capture_ns, seen), gated, rules.noise_learning)
-    return taken._replace(known=taken.known._replace(noise=learned))
+    after = taken.known
+    # An outlier of the follower may be one by a wrong mount.
+    if taken.cause == BELIEVED or taken.cause == LEADER_OFF or taken.cause == FOLLOWER_OFF:
+        jumped = taken.verdict == RESTARTED
+        check = mount_watched(after.mount_check, capture_ns, seen.follower, using.noise, jumped)
+        after = after._replace(mount_check=check)
+    if learns:
+        gated = taken.cause != BELIEVED
+        learned = noise_with_frame(known.noise, Moment(capture_ns, seen), gated, rules.noise_learning)
+        after = after._replace(noise=learned)
+        if is_another(learned):
+            after = _on_other_noise(after, memory, rules.filter)
+    return taken._replace(known=after)
+
+
+@kernel
+def _on_other_noise(known: Known, memory: Memory, estimator: Filter) -> Known:
+    """The same where the noise turns out to be another one than all rests on that was learned before.
+
+    How the leader drives was weighed against that, and of a larger noise the belief is less certain.
+    """
+    points, ring, noise = memory.points, known.track, known.noise
+    if ring.length > 0 and noise.scale.position > noise.basis:
+        by, point = noise.scale.position / noise.basis, newest(points, ring)
+        wider = estimator.widened(point.belief, by * by)
+        store(points, place(ring, points, ring.length - 1), point._replace(belief=wider))
+    for k in range(MEMBERS):
+        store(memory.bank, k, load(Member, memory.bank, k)._replace(score=0.0))
+    noise = noise._replace(basis=noise.scale.position)
+    return known._replace(noise=noise, process=restarted(known.process)._replace(speed=1.0, turn=1.0))
 
 
 @kernel
@@ -346,9 +389,9 @@ def _with_way(known: Known, memory: Memory, rules: Rules, measurement: Measureme
     if rules.filter.in_world or measurement.anchored or k == 0 or known.odometry.length == 0:
         return measurement
     to_ns = measurement.capture_ns
-    if measurement.framed and rules.source != ODOMETRY:
-        if rules.source != AUTO or not _is_fresh(known, rules, to_ns):
-            return measurement._replace(has_way=False)
+    by_sample = rules.source == ODOMETRY or not measurement.framed
+    if not by_sample and (rules.source != AUTO or not _is_fresh(known, rules, to_ns)):
+        return measurement._replace(has_way=False)
     from_ns = capture_at(memory.points, known.track, k - 1)
     if from_ns >= to_ns:
         return measurement
@@ -520,5 +563,7 @@ def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) 
     """Newest estimate of a track that has one, its status as seen at ``now_ns``."""
     point = newest(points, known.track)
     point = point._replace(belief=rules.filter.leader(point.belief, point.measurement))
-    told = estimate_at(point, status_of(point, now_ns, rules.settings))
-    return Told(guessed_when_slow(told, rules.filter.limits.v_eps), point.cause)
+    status, cause = status_of(point, now_ns, rules.settings), point.cause
+    if status == TRACKING and rules.mounts.stops and is_off(known.mount_check):
+        status, cause = REJECTING, MOUNT
+    return Told(guessed_when_slow(estimate_at(point, status), rules.filter.limits.v_eps), cause)

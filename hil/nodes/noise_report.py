@@ -25,6 +25,11 @@ def scale_in(values: Mapping[str, str]) -> float | None:
         return None
 
 
+def is_refuted(scale: float | None) -> bool:
+    """Whether what is told of the noise is refuted, and with it all bounds that rest on it."""
+    return scale is not None and scale > REFUTED
+
+
 def noise_report(estimate: NoiseEstimate, learning: NoiseLearning) -> dict[str, object]:
     """Diagnostics of the noise; empty where it is given."""
     if not learning.learns:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import bisect
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__PointStamped as PointStamped
 from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__PoseStamped as PoseStamped
 
 from hil.errors import UsageError
@@ -16,13 +18,15 @@ from hil.replay.topic_map import TopicMap, needs_odometry
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.events import Event
-from hil.wire.messages import MalformedPayloadError, decode_as, encode, header, to_ns, typename_of
+from hil.wire.messages import MalformedPayloadError, decode, decode_as, encode, header, to_ns, typename_of
 from hil.wire.topics import topics_of
 
 _OTHER_CLOCK_NS = 1_000_000_000
 _FRAMES = (typename_of(msg.RigidBodies), "mocap_msgs/msg/RigidBodies")
 _POSES = (typename_of(PoseStamped), typename_of(msg.Odometry))
 _MOTIONS = (typename_of(msg.Odometry), typename_of(msg.TwistStamped))
+_SIGHTINGS = (typename_of(msg.RangeBearing), typename_of(PoseStamped), typename_of(PointStamped))
+_STAMPED = (PoseStamped, PointStamped, msg.Odometry, msg.TwistStamped, msg.RangeBearing)
 _UNKNOWN_COVARIANCE = np.zeros(36)
 # A quaternion of zeros stands for none.
 _NO_POSE = msg.Pose(
@@ -54,8 +58,13 @@ def foreign_events(log: Log, chart: TopicMap) -> list[Timed]:
     are shifted so that the freshest input has no age. Raises :class:`UsageError` if the log lacks a topic or
     a body of the map, if a topic is of a type that cannot be used, or if no two poses make up a frame.
     """
-    frames = _frames(log, chart) if chart.topics.rigid_bodies else _paired_frames(log, chart)
-    inputs = sorted([*frames, *_motions(log, chart)], key=lambda each: each.log_ns)
+    frames: list[_Input] = []
+    if chart.topics.rigid_bodies is not None:
+        frames = _frames(log, chart)
+    elif chart.topics.leader_pose is not None:
+        frames = _paired_frames(log, chart)
+    inputs = [*frames, *_sightings(log, chart), *_motions(log, chart)]
+    inputs.sort(key=lambda each: each.log_ns)
     age_ns = min(each.log_ns - each.stamp_ns for each in inputs)
     shift_ns = 0 if 0 <= age_ns <= _OTHER_CLOCK_NS else age_ns
     return [(Event(each.topic, encode(each.message)), each.log_ns - shift_ns) for each in inputs]
@@ -132,7 +141,7 @@ def _pair(leader: _SeenPose, follower: _SeenPose, number: int, chart: TopicMap) 
 def _poses(log: Log, chart: TopicMap, name: str) -> list[_SeenPose]:
     topic = _present(log, chart, name, _POSES)
     poses: list[_SeenPose] = []
-    for record, message in _messages(log, topic):
+    for record, message in _messages(log, topic, chart):
         if isinstance(message, PoseStamped):
             poses.append(_SeenPose(message.pose, _stamp_ns(record, message.header, chart), record.log_ns))
         elif isinstance(message, msg.Odometry):
@@ -149,7 +158,7 @@ def _motions(log: Log, chart: TopicMap) -> list[_Input]:
         return []
     topic = _present(log, chart, name, _MOTIONS)
     motions: list[_Input] = []
-    for record, message in _messages(log, topic):
+    for record, message in _messages(log, topic, chart):
         if isinstance(message, msg.Odometry):
             pose, twist = message.pose.pose, message.twist
         elif isinstance(message, msg.TwistStamped):
@@ -178,12 +187,36 @@ def _is_missed(log: Log, chart: TopicMap) -> bool:
     return needs_odometry(chart.scenario) or bool(misnamed)
 
 
-def _messages(log: Log, topic: str) -> Iterator[tuple[Record, msg.Message]]:
+def _sightings(log: Log, chart: TopicMap) -> list[_Input]:
+    """The leader as the follower saw it, by range and bearing out of whatever tells its place."""
+    name, own = chart.topics.sighting, topics_of(chart.scenario)
+    if name is None:
+        return []
+    topic = _present(log, chart, name, _SIGHTINGS)
+    sightings: list[_Input] = []
+    for record, message in _messages(log, topic, chart):
+        if isinstance(message, msg.RangeBearing):
+            rho, alpha2 = message.rho, message.alpha2
+        elif isinstance(message, PoseStamped | PointStamped):
+            at = message.point if isinstance(message, PointStamped) else message.pose.position
+            rho, alpha2 = math.hypot(at.x, at.y), math.atan2(at.y, at.x)
+        else:
+            continue
+        stamp_ns = _stamp_ns(record, message.header, chart)
+        seen = msg.RangeBearing(header(stamp_ns, own.follower), rho, alpha2)
+        sightings.append(_Input(own.sighting, seen, stamp_ns, record.log_ns))
+    if not sightings:
+        raise UsageError(f"log {log.path}: topic {topic!r} has no sighting that can be read; correct the map")
+    return sightings
+
+
+def _messages(log: Log, topic: str, chart: TopicMap) -> Iterator[tuple[Record, msg.Message]]:
     """Messages of a topic that can be decoded and have a stamp that is one."""
     for record in log.records([topic]):
         try:
-            message = log.decode(record)
-            if isinstance(message, PoseStamped | msg.Odometry | msg.TwistStamped):
+            told = chart.topics.types.get(topic.removeprefix("/"))
+            message = decode(record.payload, told) if told else log.decode(record)
+            if isinstance(message, _STAMPED):
                 to_ns(message.header.stamp)
                 yield record, message
         except MalformedPayloadError:
@@ -203,6 +236,7 @@ def _present(log: Log, chart: TopicMap, name: str, accepted: tuple[str, ...]) ->
     for topic, typename in log.topics.items():
         if topic.removeprefix("/") != name:
             continue
+        typename = chart.topics.types.get(name, typename)
         if typename not in accepted:
             raise UsageError(
                 f"log {log.path}: topic {topic!r} is {typename}, expected {' or '.join(accepted)}; "

@@ -8,7 +8,7 @@ from estimation.filters.belief import Model
 from estimation.filters.estimator import Estimator
 from estimation.filters.estimators import make_estimator, settling
 from estimation.filters.filter import Filter
-from estimation.filters.lever_arm import Lever
+from estimation.filters.lever_arm import Lever, is_centred
 from estimation.models.coordinated_turn import LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, PoseNoise
 from estimation.own_motion.odometry_history import InputTrust
@@ -93,7 +93,7 @@ def leader_lever(scenario: Scenario) -> Lever:
 def refuse_leader_lever(scenario: Scenario) -> None:
     """Raise :class:`UsageError` for a leader's body off its wheel axis where the estimator knows none."""
     given, lever = scenario.estimator, leader_lever(scenario)
-    if lever.vanishes():
+    if is_centred(lever):
         return
     without = given.kind not in ("ekf", "ukf") or given.bias_states or given.certify
     if without:

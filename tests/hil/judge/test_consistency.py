@@ -53,6 +53,13 @@ def test_nobody_is_told_of_what_could_be_chance_or_does_not_matter() -> None:
     assert not nees_finding({"nees": {"u1": 9.0}})
 
 
+def test_errors_that_never_change_are_found_by_how_few_are_explained() -> None:
+    once: dict[str, Any] = {"nees": {"u1": 7.3}, "nees_limits": {"u1": [0.0, 12.6]}}
+    assert not nees_finding(once | {"coverage_3sigma": {"u1": 0.95}})
+    said = nees_finding(once | {"coverage_3sigma": {"u1": 0.58}})
+    assert "too confident: u1 7.3 (58% within 3 deviations" in said
+
+
 def test_without_truth_nothing_is_said(exact_run_data: RunData) -> None:
     columns = columns_of(exact_run_data)
     found: dict[str, Any] = judge_nees(columns.samples, {})

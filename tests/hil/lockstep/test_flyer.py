@@ -60,6 +60,9 @@ def lying(kind: str, **numbers: object) -> str:
     return f'robot.odometry_faults=[{{ kind = "{kind}", at_s = 0.3{values} }}]'
 
 
+MOUNTED = [f"{key}=[0.05, -0.02, 0.2]" for key in ("leader.mount", "follower.mount")]
+MOUNTED += [f"mocap.{key}=[0.05, -0.02, 0.2]" for key in ("leader_mount", "follower_mount")]
+
 CASES = [
     ("turtlebot3", ["estimator.kind=ekf", *LATE, *FAULTS]),
     ("turtlebot3", ["estimator.kind=ekf", "controller.law=ideal", *SLOW]),
@@ -97,6 +100,9 @@ CASES = [
     ("turtlebot3", ["estimator.kind=ekf-filterpy", *BODY]),
     ("changing-sides", ["formation.change_sides_at_s=[1.0, 1.6]"]),
     ("chain5-turtlebot3", ["controller.law=ideal", "mocap.jitter_s=0.01", "mocap.loss=0.1"]),
+    ("turtlebot3", [*MOUNTED, "mocap.follower_mount=[0.02, 0.03, 0.5]", "run.duration_s=4"]),
+    ("turtlebot3", [*MOUNTED, "estimator.kind=ukf", *BODY, "mocap.jitter_s=0.02"]),
+    ("chain5-turtlebot3", MOUNTED),
 ]
 
 

@@ -60,7 +60,16 @@ PROCESS = NOTHING_LEARNED._replace(speed=0.5, turn=2.0)
 
 def filled(desk: Desk) -> Known:
     check = UNCHECKED._replace(heard=True, resets=1)
-    known = Known(Ring(1, 2), Ring(3, 4), Ring(5, 6), Correction(0.01, 0.1, 0.2), check, 7, LEARNED, PROCESS)
+    known = NOTHING_KNOWN._replace(
+        track=Ring(1, 2),
+        odometry=Ring(3, 4),
+        own=Ring(5, 6),
+        correction=Correction(0.01, 0.1, 0.2),
+        odometry_check=check,
+        watched_ns=7,
+        noise=LEARNED,
+        process=PROCESS,
+    )
     store(desk.known, 0, known)
     return known
 
