@@ -14,6 +14,7 @@ from estimation.own_motion.odometry_correction import (
 )
 from estimation.time.host_time import HostTime
 from estimation.tracking.estimate import Estimate
+from estimation.tracking.mount_check import is_off
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE
 from formation.records import load
 from hil.nodes.certifying import Believed, certifying
@@ -213,6 +214,8 @@ class EstimatorNode:
         problem = "" if known.track.length and moving.length else "waiting for mocap and odometry"
         problem = problem or mount_problem(known.mount_check, stops=stops)
         values: dict[str, object] = {"status": state.memory.status(now_ns).name.lower()}
+        if stops and values["status"] == "tracking" and is_off(known.mount_check):
+            values["status"] = "rejecting"
         values |= mount_report(known.mount_check)
         values |= clock_report(state.times, state.memory.desk.time)
         values |= (
