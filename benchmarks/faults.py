@@ -31,6 +31,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from controllers.laws import independent
 from controllers.limits import Limits
+from estimation.bounds.window_velocity import window_velocity
 from estimation.models.measurement import FrontEnd, PairSeen
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.tracking.estimate import Estimate
@@ -43,6 +44,7 @@ from formation.shape import Shape, follower_pose, shape_of, shape_rates
 from hil.emulator.faults import Pair, fault_rows, faulty
 from hil.nodes.estimator import EstimatorNode
 from hil.nodes.estimator_desk import TimedFrame
+from hil.nodes.estimator_step import Known
 from hil.scenario.files import load_scenario
 from hil.scenario.parts import gains, leader_program
 from hil.scenario.schema import FaultSection, Scenario
@@ -160,7 +162,7 @@ def inject(
     end = at if fault is None or stays else at + max(fault.duration_s, PERIOD)
     uncertain_until = end + node.rules.step.settings.jump_uncertain_for
     until = uncertain_until + 1.0 if stays else end + after
-    memory = node.begin(0).memory
+    memory, assumed = node.begin(0).memory, node.rules.assumed
     last: Pair | None = None
     back = math.inf
     for k, moment in enumerate(drive(node.scenario, generator, math.ceil(until / PERIOD))):
@@ -188,7 +190,9 @@ def inject(
             pair = faulty(fault_rows([fault]), t, PERIOD, pair, pair).pair
         errors = errors_of(found, pair, moment.leader, moment.follower)
         sd = np.sqrt(np.diagonal(found.covariance)).tolist()
-        bound_v1, bound_alpha1, _ = bounds_of(found, node.rules.assumed)
+        track = load(Known, memory.desk.known, 0).track
+        window = window_velocity(memory.desk.points, track, assumed.positions.longest)
+        bound_v1, bound_alpha1, _ = bounds_of(found, assumed, window)
         score.tracking += 1
         score.beyond_sigma += any(e > 5.0 * s for e, s in zip(errors.values(), sd, strict=False))
         score.beyond_bound += errors["v1"] > bound_v1 or errors["alpha1"] > bound_alpha1

@@ -20,6 +20,8 @@ from estimation.bounds.assumptions import Assumptions
 from estimation.bounds.error_bounds import Perceived, RateErrors, paper_h, sound_h
 from estimation.bounds.guarantees import alpha2_ultimate, guaranteed_rate
 from formation.angles import FloatArray
+from formation.error_set import error_set
+from formation.error_set_kernels import ErrorModel
 from formation.invariant_set import Disturbed, InvariantSet, invariant_set
 from formation.speed_range import SpeedRange
 from formation.station import Side
@@ -31,6 +33,10 @@ _SETTLED = 1e-6
 
 MANIFOLD = "the reduced system (5), that is alpha2 at rest, under law (8), without limits or lag"
 START = "a start inside the set"
+NOT_SAFETY = (
+    "boundedness, not safety: rho lies between the middles of two robots, which touch where it comes down to "
+    "their width (a TurtleBot3 Burger is 0.178 m wide)"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +111,7 @@ def _sources(given: Assumptions) -> tuple[str, ...]:
         f"v1 <= k_v = {given.k_v:g} m/s at constant speed and |u1| <= k_u = {given.k_u:g} rad/s, "
         f"so that the leader accelerates by at most {given.acceleration:.3g} m/s^2",
         f"a measurement every {1e3 * given.step:.3g} ms over the window, none missing",
-        "a plain difference over the best window; a Kalman filter does better, unguaranteed",
+        "a plain difference over the best window; a Kalman filter errs less as a rule, more at its worst",
     )
 
 
@@ -198,15 +204,18 @@ def _formation(given: Assumptions, system: Disturbed, held: InvariantSet | None,
         if speeds.lowest == speeds.highest
         else f"v1 anywhere between {speeds.lowest:g} and {speeds.highest:g} m/s"
     )
-    assumes = (f"|u1| <= k_u = {given.k_u:g} rad/s", drives, besides, MANIFOLD, START)
+    assumes = (f"|u1| <= k_u = {given.k_u:g} rad/s", drives, besides, MANIFOLD, START, NOT_SAFETY)
     if held is None:
         return Claim({}, assumes, given.unproved or _why_not_held(given, system))
+    return Claim(_extremes(given, held), assumes)
+
+
+def _extremes(given: Assumptions, held: InvariantSet) -> dict[str, float]:
     # The left is the right's mirror image, which changes the sign of every bearing.
     low, high = (held.alpha1_min, held.alpha1_max)
     if given.side is Side.LEFT:
         low, high = -high, -low
-    figures = {"rho_min": held.rho_min, "rho_max": held.rho_max, "alpha1_min": low, "alpha1_max": high}
-    return Claim(figures, assumes)
+    return {"rho_min": held.rho_min, "rho_max": held.rho_max, "alpha1_min": low, "alpha1_max": high}
 
 
 def _why_not_held(given: Assumptions, system: Disturbed) -> str:
@@ -228,6 +237,49 @@ def _formation_any_speed(given: Assumptions, system: Disturbed) -> Claim:
 def _formation_with_errors(
     given: Assumptions, velocity_error: float, system: Disturbed, held: InvariantSet | None
 ) -> Claim:
+    """The set under one wrong velocity in all terms at once; by the bound of h where v1 varies.
+
+    alpha2 is at rest in it. ``assumes`` tells how far the same error moves it.
+    """
+    if given.unproved or system.speeds.lowest != system.speeds.highest:
+        return _formation_by_h(given, velocity_error, system, held)
+    v1, spacing = system.speeds.lowest, given.spacing
+    model = ErrorModel(given.mu1, spacing.rho_0, spacing.mu_rho, v1, given.k_u, velocity_error)
+    found = error_set(model)
+    besides = (
+        f"the believed velocity of the leader off by at most W = {velocity_error:.4g} m/s, in any direction"
+    )
+    if found is None:
+        why = (
+            f"the worst steering within {given.k_u:g} rad/s with the worst belief within "
+            f"{velocity_error:.3g} m/s carries alpha1 past its saddle, or the robots apart"
+        )
+        return Claim({}, _formation(given, system, None, besides).assumes, why)
+    assumes = (
+        *_formation(given, system, found.inside, besides).assumes,
+        "proved piece by piece along the whole boundary, which every motion crosses inwards at "
+        f"{found.inward:.1e} rho_0 or rad a second at the least",
+        _moved_aside(given, velocity_error / found.inside.rho_min),
+    )
+    return Claim(_extremes(given, found.inside) | {"W": velocity_error}, assumes)
+
+
+def _moved_aside(given: Assumptions, M_alpha2: float) -> str:
+    """How far a wrong belief of the leader moves alpha2, in words."""
+    if not M_alpha2 < given.mu2:
+        return (
+            f"alpha2 at rest, though its rate errs by up to {M_alpha2:.3g} rad/s, which mu2 does not outweigh"
+        )
+    ball = float(alpha2_ultimate(M_alpha2, given.mu2))
+    return (
+        f"alpha2 at rest: its rate errs by up to W / rho_min = {M_alpha2:.3g} rad/s, which keeps it within "
+        f"{ball:.3g} rad; the set does not allow for that"
+    )
+
+
+def _formation_by_h(
+    given: Assumptions, velocity_error: float, system: Disturbed, held: InvariantSet | None
+) -> Claim:
     """The set for D = k_u + the largest bound of h within it: enlarged until it holds for itself."""
     besides = "estimates as wrong as the sound bound of h allows"
     disturbed = system
@@ -237,7 +289,8 @@ def _formation_with_errors(
         error = float(_h_bounds(given, velocity_error, *_states(given, velocity_error, held))[1].max())
         enlarged = given.k_u + error
         if abs(enlarged - disturbed.D) <= _SETTLED:
-            return _formation(given, disturbed, held, f"{besides}, {error:.3g} rad/s")
+            claim = _formation(given, disturbed, held, f"{besides}, {error:.3g} rad/s")
+            return replace(claim, figures=claim.figures | {"W": velocity_error})
         disturbed = replace(disturbed, D=enlarged + 0.5 * _SETTLED)
         held = invariant_set(disturbed)
     return Claim({}, (besides,), "the set and the error of h within it keep enlarging each other")

@@ -14,8 +14,12 @@ import numpy as np
 
 from estimation.models.coordinated_turn import FollowerMotion, Spread
 from estimation.models.motion import Matrix, Vector
+from formation.angles import wrapped
+from formation.arc import small_turn
 from formation.kernel import kernel
 from formation.pose import Pose
+
+NO_MOTION = FollowerMotion(0.0, 0.0, 0.0, 0.0)
 
 
 class FrontEnd(Enum):
@@ -48,6 +52,9 @@ class Measurement(NamedTuple):
     in_world: whether x and y are mocap's; the follower's pose is then that of ``seen``.
     framed: whether all this comes from a mocap frame, which is ``seen``, or from a sighting.
     noise: of the pose in ``seen``.
+    has_way, way: the follower's mean motion since the measurement before, where more of it is known than what
+    it was at both ends. anchored: x and y are along the axes of the *measured* pose, so that poses tell the
+    way between two of them without error, and the noise of the pose is not in the spread.
     """
 
     capture_ns: int
@@ -59,6 +66,9 @@ class Measurement(NamedTuple):
     framed: bool
     seen: PairSeen
     noise: PoseNoise
+    has_way: bool = False
+    way: FollowerMotion = NO_MOTION
+    anchored: bool = False
 
     @staticmethod
     def at(capture_ns: int, position: Vector, covariance: Matrix, motion: FollowerMotion) -> Measurement:
@@ -151,3 +161,25 @@ def measure_body_from_mocap(
     spread = spread_of_sight(x / rho, y / rho, along, across)
     seen = PairSeen(leader[0], leader[1], follower)
     return Measurement(capture_ns, x, y, spread, motion, False, True, seen, noise)
+
+
+@kernel
+def measure_body_anchored(
+    capture_ns: int, leader: tuple[float, float], follower: Pose, noise: PoseNoise, motion: FollowerMotion
+) -> Measurement:
+    """The same along the axes of the pose as it was measured: its heading's noise turns all there is alike.
+
+    What is left is that of both positions, 2 sigma_p^2 in every direction.
+    """
+    level = PoseNoise(noise.position, 0.0)
+    measured = measure_body_from_mocap(capture_ns, leader, follower, level, motion)
+    return measured._replace(noise=noise, anchored=True)
+
+
+@kernel
+def way_between(before: Pose, after: Pose, dt: float) -> FollowerMotion:
+    """Mean motion that leads from one pose to another in dt [s], as if there were no error in either."""
+    turn, dx, dy = wrapped(after.theta - before.theta), after.x - before.x, after.y - before.y
+    middle = before.theta + 0.5 * turn
+    chord = dx * math.cos(middle) + dy * math.sin(middle)
+    return FollowerMotion(chord / (small_turn(0.5 * turn).sinc * dt), turn / dt, 0.0, 0.0)

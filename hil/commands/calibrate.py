@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,7 +45,7 @@ def command(
 
     Commands and odometry tell the lag and delay of the robot, odometry and mocap frames how late the stamps
     of mocap are, sightings and mocap poses by how much a range and bearing sensor is off, and the poses
-    alone where the rigid bodies sit on their robots.
+    alone where the rigid bodies sit on their robots and how noisy they are.
 
     --from and --to are seconds since the first sighting or, for the timing, the first odometry; for imported
     recordings the source's own time.
@@ -63,6 +64,7 @@ def command(
     if found.offsets is not None:
         _say_offsets(log, found.offsets)
     _say_mounts(found.mounts)
+    _say_noise(found.noise)
     if as_json:
         print_json(found.as_dict())
 
@@ -79,6 +81,16 @@ def _say_mounts(found: Mounts) -> None:
     for key, mount in found.settings.items():
         section, _, name = key.partition(".")
         click.echo(f"[{section}]\n{name} = [{', '.join(f'{value:g}' for value in mount)}]", err=True)
+
+
+def _say_noise(found: Mapping[str, float]) -> None:
+    """Print the lines of a scenario that tell the noise of the measurements."""
+    from hil.replay.noise_calibration import said_noise
+
+    if found:
+        click.echo(
+            f"measurements scatter by, with which bounds and estimates begin:\n{said_noise(found)}", err=True
+        )
 
 
 def _say_timing(found: Calibration) -> None:

@@ -173,8 +173,7 @@ class EmulatorNode:
 
     def _tell_odometry(self, plant: Plant, happened: Happened, out: list[Outgoing]) -> None:
         """Publish odometry that arrives, without delay at the sample itself, and what the leader drives."""
-        if happened.kind != SAMPLE or not self.delayed:
-            out += self.writer.odometry(plant, happened.slot, happened.stamp_ns)
+        out += self.writer.odometry(plant, happened.slot, happened.stamp_ns)
         if happened.kind == SAMPLE:
             out.append(self.writer.drives(plant, happened.stamp_ns))
 

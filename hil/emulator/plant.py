@@ -25,6 +25,7 @@ from hil.emulator.mocap import (
     block_length,
     draw_into,
 )
+from hil.emulator.odometry_faults import Reckoning, odometry_fault_rows
 from hil.emulator.robot import Actuators, Robot, standing
 from hil.emulator.world import (
     NO_NUMBERS,
@@ -109,9 +110,12 @@ def memory_of(scenario: Scenario, poses: tuple[Pose, ...], room: int = _ROOM) ->
         rows_of(Pose, robots),
         rows_of(SeenPose, room * robots),
         rows_of(Odometry, room * robots),
+        odometry_fault_rows(scenario.robot.odometry_faults),
+        rows_of(Reckoning, robots),
     )
     for k, pose in enumerate(poses):
         store(memory.robots, k, standing(pose))
+        store(memory.reckoned, k, Reckoning(pose, pose))
     columns_of(memory.underway)["slot"] = np.arange(room)
     return memory
 

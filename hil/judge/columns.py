@@ -22,13 +22,16 @@ from hil.wire.messages import to_ns
 
 _SEEN = ("rho", "alpha2", "rho_dot", "alpha2_dot", "v1", "alpha1", "v2", "u2")
 _ESTIMATED = attrgetter(*_SEEN, "u1", "nis")
+_BOUND_NAMES = ("bound_v1", "bound_alpha1", "bound_h")
+_BOUNDS = attrgetter(*_BOUND_NAMES)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EstimateColumns:
     """Estimates as arrays of shape (n,), ``sd`` (n, 5) of the quantities in the order of the covariance.
 
-    ``seen`` is what the bounds need of them; units and signs as in ``LeaderEstimate.msg``.
+    ``seen`` is what the bounds need of them; units and signs as in ``LeaderEstimate.msg``. ``bounds`` (n, 3):
+    of v1, alpha1 and h as they were published, None for estimates that were not.
     """
 
     capture_ns: Stamps
@@ -37,6 +40,7 @@ class EstimateColumns:
     u1: FloatArray
     nis: FloatArray
     sd: FloatArray
+    bounds: FloatArray | None = None
 
     @staticmethod
     def of(estimates: Sequence[LeaderEstimate]) -> EstimateColumns:
@@ -50,11 +54,12 @@ class EstimateColumns:
             u1=columns[8],
             nis=columns[9],
             sd=np.sqrt(np.maximum(variances, 0.0)),
+            bounds=np.array(list(map(_BOUNDS, estimates)), dtype=np.float64).reshape(-1, 3),
         )
 
     @staticmethod
     def of_rows(rows: NDArray[np.void]) -> EstimateColumns:
-        """Columns of rows of :class:`hil.replay.kept_rows.EstimateRow`, nothing copied but the deviations."""
+        """Columns of rows of :class:`hil.replay.kept_rows.EstimateRow`, deviations and bounds copied."""
         return EstimateColumns(
             capture_ns=rows["capture_ns"],
             status=rows["status"],
@@ -62,6 +67,7 @@ class EstimateColumns:
             u1=rows["u1"],
             nis=rows["nis"],
             sd=np.sqrt(np.maximum(np.column_stack([rows[f"var_{name}"] for name in QUANTITIES]), 0.0)),
+            bounds=np.column_stack([rows[name] for name in _BOUND_NAMES]),
         )
 
     def only(self, rows: NDArray[np.bool_]) -> EstimateColumns:
@@ -74,6 +80,7 @@ class EstimateColumns:
             u1=self.u1[rows],
             nis=self.nis[rows],
             sd=self.sd[rows],
+            bounds=None if self.bounds is None else self.bounds[rows],
         )
 
 

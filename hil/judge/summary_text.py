@@ -12,6 +12,8 @@ from rich.table import Table
 from rich.text import Text
 
 from hil.judge.made_by import law_failure, made_by
+from hil.judge.noise import noise_warnings
+from hil.nodes.findings import finding_line
 
 GOOD, BAD, PLAIN = "green", "bold red", ""
 LEAST_COVERAGE = 0.97
@@ -44,11 +46,13 @@ def warnings_of(summary: Mapping[str, Any]) -> list[str]:
     """What deserves a second look, in plain words."""
     return [
         *_estimation_warnings(summary),
+        *noise_warnings(summary),
         *_assumption_warnings(summary),
         *_certified_warnings(summary),
         *_formation_warnings(summary),
         *_wire_warnings(summary),
         *filter(None, [law_failure(summary)]),
+        *map(finding_line, summary.get("findings", [])),
     ]
 
 
@@ -84,7 +88,7 @@ def parity_line(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
 
 
 def _estimate_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
-    estimation, bounds = summary["estimation"], summary["bounds"]
+    estimation = summary["estimation"]
     rmse = estimation.get("rmse", {})
     parts = []
     if "v1" in rmse:
@@ -94,13 +98,42 @@ def _estimate_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]
     if parts:
         judged = f"({estimation['samples']} samples from {estimation['evaluated_from_s']:.3g} s on)"
         yield "estimate", f"RMSE {', '.join(parts)} {judged}", PLAIN
+    yield from _nees_line(estimation)
+    yield from _bound_lines(summary)
+
+
+def _bound_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """The bounds that estimates went out with; and those whose premise are the errors that were seen."""
+    bounds = summary["bounds"]
+    published = bounds.get("published", {})
+    if "violations" in published:
+        count, style = _times(sum(published["violations"].values()))
+        v1, alpha1 = (published["median"][name] for name in ("v1", "alpha1"))
+        within = f"v1 within {1e3 * v1:.1f} mm/s, alpha1 within {math.degrees(alpha1):.0f} deg (medians)"
+        used = f"errors up to {max(published['tightness'].values()):.0%}"
+        yield "bounds", f"{within}, violated {count} in {published['checked']} samples ({used})", style
     if "violations" in bounds:
-        broken = extended_violations(summary)
+        count, style = _times(sum(extended_violations(summary).values()))
         shares = [value for name, value in bounds["tightness"].items() if name.endswith("_extended")]
         tight = f" (errors up to {max(shares):.0%})" if shares else ""
-        count = f"{sum(broken.values())} times" if broken else "nowhere"
-        verdict = f"extended ones violated {count} in {bounds['checked']} samples{tight}"
-        yield "bounds", verdict, BAD if broken else GOOD
+        verdict = f"by the largest errors seen: extended ones violated {count} in {bounds['checked']} samples"
+        yield "", verdict + tight, style
+
+
+def _times(broken: int) -> tuple[str, str]:
+    """How often bounds were violated, in words, with its style."""
+    return (f"{broken} times", BAD) if broken else ("nowhere", GOOD)
+
+
+def _nees_line(estimation: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    limits = estimation.get("nees_limits", {})
+    parts = []
+    for name in ("v1", "alpha1", "u1"):
+        if name in limits:
+            low, high = limits[name]
+            parts.append(f"{name} {estimation['nees'][name]:.2f} ({low:.2f} to {high:.2f})")
+    if parts:
+        yield "nees", f"squared errors over their variances: {', '.join(parts)}", PLAIN
 
 
 def _certified_line(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
@@ -177,7 +210,7 @@ def _estimation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     low = {
         name: share
         for name, share in estimation.get("coverage_3sigma", {}).items()
-        if name in ("v1", "alpha1") and share < LEAST_COVERAGE
+        if name in ("v1", "alpha1", "u1") and share < LEAST_COVERAGE
     }
     for name, share in low.items():
         yield f"the estimator is too sure of {name}: only {share:.1%} of errors within 3 standard deviations"
@@ -187,6 +220,12 @@ def _estimation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
         yield f"the measurements are {noisier} than the scenario says (mean NIS {nis:.2g}, expected 2)"
     for name, count in extended_violations(summary).items():
         yield f"bound {name} does not hold in {count} samples: check the noise and leader limits it rests on"
+    for name, count in summary["bounds"].get("published", {}).get("violations", {}).items():
+        if count:
+            yield (
+                f"bound_{name} as published does not hold in {count} samples: noise or leader went beyond "
+                "what the scenario says of them"
+            )
 
 
 def _assumption_warnings(summary: Mapping[str, Any]) -> Iterator[str]:

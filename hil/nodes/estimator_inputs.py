@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 
 from controllers.guard import CLOCK_TOLERANCE_NS
+from estimation.bounds.window_velocity import window_velocity
 from estimation.models.measurement import PairSeen, from_sensor, measure_body
-from estimation.own_motion.odometry_history import MotionSample
+from estimation.own_motion.odometry_check import OdometrySample
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE
 from estimation.tracking.tracker import COASTING, LOST, status_of
 from estimation.tracking.tracker import newest as newest_point
@@ -26,7 +27,9 @@ from hil.nodes.frame_time import time_of
 from hil.nodes.refusals import (
     BAD_RANGE,
     NO_BODY_FRONT_END,
+    NOT_FINITE,
     NOT_REFUSED,
+    ODOMETRY_NOT_FINITE,
     SAME_PLACE,
     TAKEN_FRAME,
     TAKEN_LATE,
@@ -76,11 +79,13 @@ def _read_frame(desk: Desk, payload: bytes, names: bytes, again: bool) -> Frame:
 def _estimated(desk: Desk, reasons: bytes, now_ns: int) -> int:
     """Put the newest estimate of a track that has one down, and its message into the buffer; its length."""
     rules, notes = load(NodeRules, desk.rules, 0), load(Notes, desk.notes, 0)
-    newest = step.estimate(load(Known, desk.known, 0), desk.points, rules.step, now_ns)
+    known = load(Known, desk.known, 0)
+    newest = step.estimate(known, desk.points, rules.step, now_ns)
     estimate = newest.estimate
+    window = window_velocity(desk.points, known.track, rules.assumed.positions.longest)
     store(desk.newest, 0, estimate)
     reason = reason_number(estimate.status, newest.cause)
-    numbers = estimate_numbers(estimate, rules.assumed, reason, notes.receipts, now_ns)
+    numbers = estimate_numbers(estimate, window, rules.assumed, reason, notes.receipts, now_ns)
     store(desk.notes, 0, notes._replace(receipts=0, estimated_ns=now_ns))
     return write_estimate_message(
         desk.buffer, rules.times_at, reasons, numbers, estimate.joint, desk.receipts
@@ -137,10 +142,15 @@ def odometry_seen(desk: Desk, payload: bytes, digest: int, now_ns: int) -> int:
     """Read the follower's odometry."""
     came = _received(desk, digest, now_ns)
     motion = check_odometry(read_odometry(payload), now_ns + CLOCK_TOLERANCE_NS)
+    if motion.cause == NOT_FINITE:
+        count(desk.counts, ODOMETRY_NOT_FINITE)
+        store(desk.known, 0, step.take_not_finite(load(Known, desk.known, 0), now_ns))
+        return came
     if motion.cause != NOT_REFUSED:
         count(desk.counts, motion.cause)
         return came
-    store(desk.sample, 0, MotionSample(motion.stamp_ns, motion.v2, motion.u2))
+    told = OdometrySample(motion.stamp_ns, motion.v2, motion.u2, motion.has_pose, motion.pose)
+    store(desk.sample, 0, told)
     count(desk.counts, TAKEN_ODOMETRY)
     return came + SEEN
 
@@ -182,11 +192,14 @@ def _take_sighting(desk: Desk, known: Known, rules: Rules) -> Taken:
     """Take the sighting that was seen into the leader's track."""
     memory, sensor = desk.memory(), load(NodeRules, desk.rules, 0).sensor
     seen = load(Sighting, desk.sighting, 0)
-    motion = step.by_odometry(known, memory, rules, seen.capture_ns)
-    measurement = measure_body(
-        seen.capture_ns, seen.rho, seen.alpha2, sensor.sigma_range, sensor.sigma_bearing, motion
-    )
-    return step.take(known, memory, rules, measurement)
+    if rules.source == step.AUTO:
+        motion = step.by_either_at(known, memory, rules, seen.capture_ns)
+    else:
+        motion = step.by_odometry(known, memory, rules, seen.capture_ns)
+    scale = known.noise.scale
+    sd_range, sd_bearing = scale.range * sensor.sigma_range, scale.bearing * sensor.sigma_bearing
+    measurement = measure_body(seen.capture_ns, seen.rho, seen.alpha2, sd_range, sd_bearing, motion)
+    return step.with_sight_noise(step.take(known, memory, rules, measurement), memory, rules)
 
 
 @kernel
@@ -198,7 +211,7 @@ def taken(desk: Desk, what: int, reasons: bytes, now_ns: int) -> int:
     """
     known, rules = load(Known, desk.known, 0), load(NodeRules, desk.rules, 0).step
     if what == ODOMETRY:
-        sample = load(MotionSample, desk.sample, 0)
+        sample = load(OdometrySample, desk.sample, 0)
         store(desk.known, 0, step.take_odometry(known, desk.memory(), rules, sample))
         return 0
     if what == FRAME:

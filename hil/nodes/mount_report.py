@@ -26,25 +26,32 @@ def mount_problem(check: MountCheck, *, stops: bool) -> str:
 
 
 def mount_report(check: MountCheck) -> dict[str, object]:
-    """Values of a diagnostics message: what is left of the mount, and findings while it is worth a word."""
+    """Values of a diagnostics message: what is left of the mount."""
     left = mount_left(check)
     if not left.known:
         return {}
-    values: dict[str, object] = {
+    return {
         "mount.yaw_deg": round(left.yaw * _DEGREES, 3),
         "mount.yaw_sd_deg": round(left.sd_yaw * _DEGREES, 3),
         "mount.x_mm": round(left.place * _MILLIMETRES, 2),
         "mount.x_sd_mm": round(left.sd_place * _MILLIMETRES, 2),
     }
+
+
+def mount_findings(check: MountCheck) -> dict[str, str]:
+    """Findings, while what is left of the mount is worth a word."""
+    left, found = mount_left(check), dict[str, str]()
+    if not left.known:
+        return found
     if surely_above(left.yaw, left.sd_yaw, NOTED_YAW):
-        values["finding.frame_yaw"] = f"{_yaw_text(left)}, expected 0"
+        found["frame_yaw"] = f"{_yaw_text(left)}, expected 0"
     if surely_above(left.place, left.sd_place, NOTED_PLACE):
-        values["finding.frame_pivot"] = (
+        found["frame_pivot"] = (
             f"the follower's body sits {left.place * _MILLIMETRES:+.1f} mm (sd "
             f"{left.sd_place * _MILLIMETRES:.1f}) further ahead of the wheel axis than follower.mount says, "
             "expected 0"
         )
-    return values
+    return found
 
 
 def _yaw_text(left: MountLeft) -> str:

@@ -28,6 +28,7 @@ class EstimateRow(NamedTuple):
     nis: float
     bound_v1: float
     bound_alpha1: float
+    bound_h: float
     var_rho_dot: float
     var_alpha2_dot: float
     var_v1: float
@@ -107,6 +108,7 @@ def estimate_row(n: EstimateNumbers, payload: bytes, covariance_at: int) -> Esti
         n.nis,
         n.bound_v1,
         n.bound_alpha1,
+        n.bound_h,
         read_float(payload, covariance_at),
         read_float(payload, covariance_at + _DIAGONAL_BYTES),
         read_float(payload, covariance_at + 2 * _DIAGONAL_BYTES),

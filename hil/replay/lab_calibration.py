@@ -15,6 +15,7 @@ from hil.log.report_json import known
 from hil.replay.calibration import calibrate
 from hil.replay.foreign_log import foreign_events
 from hil.replay.mount_calibration import Mounts, mounts_of_events, mounts_of_log
+from hil.replay.noise_calibration import noise_of_log
 from hil.replay.timing import VAGUE, Timing, timing_of
 from hil.replay.topic_map import TopicMap
 from hil.scenario.files import with_overrides
@@ -32,7 +33,8 @@ class Calibration:
     something of it is not known, a line each. ``uncertain``: that the correction is too uncertain to be set.
     ``settings``: scenario keys that put it right. ``offsets``: of a range and bearing sensor, ``range`` [m]
     and ``bearing`` [rad], each with ``offset``, ``sd`` and ``spread``; None without sightings.
-    ``mounts``: where the bodies of leader and follower sit on their robots.
+    ``mounts``: where the bodies of leader and follower sit on their robots. ``noise``: standard deviations of
+    measurements by the estimator's keys for them.
 
     >>> import abreast
     >>> scenario = abreast.load_scenario("turtlebot3", {"run.duration_s": 12.0})
@@ -48,6 +50,7 @@ class Calibration:
     settings: Mapping[str, float]
     offsets: SensorBias | None
     mounts: Mounts
+    noise: Mapping[str, float]
 
     def as_dict(self) -> dict[str, Any]:
         """The JSON of ``abreast calibrate``."""
@@ -60,6 +63,8 @@ class Calibration:
             result |= {"samples": bias.samples, "outliers": bias.outliers}
             for name, offset in (("range_bias", bias.range), ("bearing_bias", bias.bearing)):
                 result |= {name: offset.value, f"{name}_sd": offset.sd, f"{name}_spread": offset.spread}
+        if self.noise:
+            result["noise"] = dict(self.noise)
         cleaned: dict[str, Any] = known(result)
         # In mounts null stands for what the motion does not tell.
         return cleaned | {"mounts": self.mounts.as_dict()}
@@ -84,13 +89,15 @@ def calibration_of(
             f"log {log.path}: has no sightings to calibrate (no topic {sighting!r}); "
             f"{'; '.join(timing.unknown)}"
         )
+    offsets = calibrate(log, scenario, from_s, to_s) if sighted else None
     return Calibration(
         timing=timing.keys(scenario),
         unknown=timing.unknown,
         uncertain=_uncertain(timing),
         settings=timing.settings(scenario),
-        offsets=calibrate(log, scenario, from_s, to_s) if sighted else None,
+        offsets=offsets,
         mounts=mounts,
+        noise=noise_of_log(log, scenario, offsets, from_s, to_s),
     )
 
 
@@ -103,7 +110,7 @@ def calibration_of_foreign(
     """
     mounts = mounts_of_events(foreign_events(log, chart), chart.scenario, from_s, to_s)
     unknown = "timing and sensor offsets: looked for in logs of abreast only; turn this one into one"
-    return Calibration({}, (unknown,), False, {}, None, mounts)
+    return Calibration({}, (unknown,), False, {}, None, mounts, {})
 
 
 def _scenario_of(log: Log, follower: str | None) -> Scenario:

@@ -62,7 +62,7 @@ class Mounts:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _BodyTracks:
+class BodyTracks:
     """Poses of both bodies by capture time [ns], and speeds [m/s] of both robots by the stamp of odometry."""
 
     leader: dict[int, Pose]
@@ -96,7 +96,7 @@ def mounts_of_events(
     absolute: bool = False,
 ) -> Mounts:
     """The same by messages of ours; times count from the first odometry unless they are ``absolute``."""
-    tracks = _body_tracks(events, scenario)
+    tracks = body_tracks(events, scenario)
     if scenario.estimator.input_lag_s > 0.0:
         # Commands stand in for odometry: they say what was wanted of the wheels, not what these did.
         tracks = replace(tracks, follower_speed={})
@@ -124,8 +124,9 @@ def _leader_odometry(scenario: Scenario) -> str:
     return f"{topics_of(scenario).leader}/odom"
 
 
-def _body_tracks(events: Iterable[Timed], scenario: Scenario) -> _BodyTracks:
-    names, tracks = topics_of(scenario), _BodyTracks({}, {}, {}, {})
+def body_tracks(events: Iterable[Timed], scenario: Scenario) -> BodyTracks:
+    """What messages of ours tell of both bodies."""
+    names, tracks = topics_of(scenario), BodyTracks({}, {}, {}, {})
     reader = frame_reader(frozenset({names.leader, names.follower}))
     wanted, leader_at = reader.pair(names.leader, names.follower), reader.names.index(names.leader)
     times, rows, rules = NO_TIME_YET, time_rows(plain_rows_of), time_rules(scenario)

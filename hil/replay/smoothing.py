@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from estimation.bounds.certified import Certain, Failed
 from estimation.models.measurement import Measurement
-from estimation.tracking.estimate import estimate_of
+from estimation.tracking.estimate import estimate_of, guessed_when_slow
 from estimation.tracking.follower_check import Cause
 from estimation.tracking.smoother import smooth
 from estimation.tracking.track import Tracker
@@ -74,7 +74,8 @@ def smoothed_estimates(node: ListeningEstimator) -> Smoothed:
         measurement = point.measurement
         capture_ns, frame_id = measurement.capture_ns, node.topics.follower
         status = tracker.status((point,), capture_ns)
-        estimate = estimate_of(point.belief, measurement, status, point.nis, point.used_ns, NO_JUMP)
+        told = estimate_of(point.belief, measurement, status, point.nis, point.used_ns, NO_JUMP)
+        estimate = guessed_when_slow(told, tracker.estimator.limits.v_eps)
         reason = reason_number(status, Cause.NONE)
         payload = writer.write(row_of(estimate), reason, capture_ns, ())
         estimates.append(decode_as(payload, LeaderEstimate))

@@ -24,9 +24,15 @@ _SCALARS = (
     ("estimation.untracked", "did not say tracking", "", 1.0),
     ("estimation.settle_s", "settled after", "s", 1.0),
     ("estimation.nis_mean", "mean NIS (2 expected)", "", 1.0),
-    ("bounds.M_rho", "bound of the error of ρ̇, M_rho", "mm/s", 1e3),
-    ("bounds.M_alpha2", "bound of the error of α̇₂, M_alpha2", "deg/s", degrees(1.0)),
+    ("bounds.M_rho", "largest error of ρ̇ seen, M_rho", "mm/s", 1e3),
+    ("bounds.M_alpha2", "largest error of α̇₂ seen, M_alpha2", "deg/s", degrees(1.0)),
     ("bounds.v_eps", "leader's least speed, v_eps", "mm/s", 1e3),
+    ("bounds.published.median.v1", "published bound of v₁, median", "mm/s", 1e3),
+    ("bounds.published.median.alpha1", "published bound of α₁, median", "deg", degrees(1.0)),
+    ("bounds.published.median.h", "published bound of h, median", "rad/s", 1.0),
+    ("bounds.published.violations.v1", "v₁ outside its published bound", "", 1.0),
+    ("bounds.published.violations.alpha1", "α₁ outside its published bound", "", 1.0),
+    ("bounds.published.violations.h", "h outside its published bound", "", 1.0),
     ("formation.rho_min", "ρ, least", "m", 1.0),
     ("formation.rho_max", "ρ, largest", "m", 1.0),
     ("formation.rho_final", "ρ at the end", "m", 1.0),
@@ -68,6 +74,7 @@ _HEAD = (
     "log.path",
     "log.messages",
     "log.bytes",
+    "findings",
 )
 """What the head of the page says."""
 
@@ -124,8 +131,10 @@ def _quality(left: dict[str, Any]) -> str:
     columns = {
         "rmse": ("RMSE", _number),
         "max": ("largest", _number),
-        "efficiency": ("× best possible", _number),
+        "efficiency": ("× bound for random leaders", _number),
         "coverage_3sigma": ("within 3 σ", lambda share: f"{share:.2%}"),
+        "nees": ("NEES", _number),
+        "nees_limits": ("expected", lambda limits: " to ".join(map(_number, limits))),
     }
     held = {
         name: what for name, what in columns.items() if any(p.startswith(f"estimation.{name}.") for p in left)
@@ -135,8 +144,8 @@ def _quality(left: dict[str, Any]) -> str:
         cells = []
         for column, (_, tell) in held.items():
             value = left.pop(f"estimation.{column}.{name}", None)
-            scale = scale_of(name) if column in ("rmse", "max") else 1.0
-            cells.append("–" if value is None else tell(scale * value))
+            scaled = scale_of(name) * value if column in ("rmse", "max") and value is not None else value
+            cells.append("–" if value is None else tell(scaled))
         if set(cells) - {"–"}:
             rows.append((f"{symbol} [{unit}]", *cells))
     caption = f"Errors of the estimates over {left.pop('estimation.samples', 0)} samples"

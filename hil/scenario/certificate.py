@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from estimation.bounds.assumptions import Assumptions
@@ -83,8 +84,9 @@ def _noise(scenario: Scenario) -> tuple[float, str]:
 
 def _speeds(scenario: Scenario) -> SpeedRange:
     program = scenario.leader.program
-    speeds = program.v if isinstance(program, TableProgram) else [program.v]
-    if min(speeds) <= 0.0:
+    driven = program.v if isinstance(program, TableProgram) else [program.v]
+    speeds = [abs(v) for v in driven]
+    if min(speeds) <= 0.0 or min(driven) < 0.0 < max(driven):
         return SpeedRange(scenario.leader.v_eps, scenario.leader.k_v)
     return SpeedRange(min(speeds), max(speeds))
 
@@ -97,14 +99,27 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
 _TITLES = {
     "rates": ("rates", "M_rho {M_rho:.4f} m/s, M_alpha2 {M_alpha2:.4f} rad/s"),
     "estimates": ("estimates", "v1 within {M_v1:.4f} m/s"),
-    "h": ("error of h", "{sound:.3f} rad/s (by the paper's form {paper:.3f}, which is not a bound)"),
+    "h": ("error of h", "{sound:.4f} rad/s (by the paper's form {paper:.4f}, which is not a bound)"),
     "alpha2_ultimate": ("alpha2", "ends within {value:.4f} rad of where it is steered"),
     "formation": ("formation", ""),
     "formation_any_speed": ("  at any speed", ""),
     "formation_with_errors": ("  with wrong estimates", ""),
-    "k_u_star": ("k_u* of Prop. 3", "between {lower:.3f} and {upper:.3f} rad/s"),
+    "k_u_star": ("k_u* of Prop. 3", "between {lower:.4f} and {upper:.4f} rad/s"),
 }
+_PRINTED = 1e4
 _SET = "rho {rho_min:.4f} to {rho_max:.4f} m, alpha1 {alpha1_min:.4f} to {alpha1_max:.4f} rad"
+
+
+_FLOORED = ("rho_min", "alpha1_min", "lower")
+"""What is bounded from below; all else from above."""
+
+
+def _rounded(figures: Mapping[str, float]) -> dict[str, float]:
+    """Figures as they are printed, to four digits behind the point and to the safe side."""
+    return {
+        name: (math.floor if name in _FLOORED else math.ceil)(_PRINTED * value) / _PRINTED
+        for name, value in figures.items()
+    }
 
 
 def certificate_lines(certificate: Certificate) -> Iterator[tuple[str, str, tuple[str, ...]]]:
@@ -112,7 +127,7 @@ def certificate_lines(certificate: Certificate) -> Iterator[tuple[str, str, tupl
     for name, claim in certificate.claims().items():
         title, text = _TITLES[name]
         figures = claim.figures
-        finding = (text or _SET).format(**figures) if figures else "nothing is guaranteed"
+        finding = (text or _SET).format(**_rounded(figures)) if figures else "nothing is guaranteed"
         if "M_alpha1" in figures:
-            finding += f", alpha1 within {figures['M_alpha1']:.4f} rad"
+            finding += f", alpha1 within {_rounded(figures)['M_alpha1']:.4f} rad"
         yield title, finding + (f": {claim.why}" if claim.why else ""), claim.assumes

@@ -8,15 +8,18 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.bounds.error_bounds import InputErrors, Perceived, RateErrors
-from estimation.bounds.guarantees import guaranteed_rate, leader_acceleration
+from estimation.bounds.filter_response import Disturbances, FlyingFilter, Responses, worst_responses
+from estimation.bounds.guarantees import guaranteed_rate, guaranteed_window, leader_acceleration
 from estimation.bounds.live_bounds import ErrorBounds, LawConstants, Moment, MomentBounds, bounds_at
+from estimation.bounds.window_velocity import WindowVelocity
+from estimation.bounds.world_bounds import PositionBounds, position_errors, world_bounds_at
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.own_motion.steady_noise import steady_noise
 from estimation.tracking.estimate import Estimate
 from formation.angles import FloatArray
 from formation.kernel import kernel
 from formation.spacing import Spacing
-from hil.scenario.leader_model import own_noise
+from hil.scenario.leader_model import leader_limits, own_noise, process_noise
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 
@@ -27,6 +30,8 @@ class AssumedErrors(NamedTuple):
     """Error bounds taken for granted where the truth is not known: three standard deviations of each input.
 
     ``rate`` [m/s] is the guaranteed error of the leader's velocity by noise and acceleration bounds.
+    ``positions``: of the mocap frame; ``in_world``: whether the leader is tracked there, so that v1 and
+    alpha1 rest on these alone.
     """
 
     rate: float
@@ -36,6 +41,8 @@ class AssumedErrors(NamedTuple):
     E_v2: float
     E_u2: float
     law: LawConstants
+    in_world: bool
+    positions: PositionBounds
 
     @staticmethod
     def of(scenario: Scenario) -> AssumedErrors:
@@ -59,6 +66,8 @@ class AssumedErrors(NamedTuple):
                 Spacing(scenario.formation.rho_0, scenario.controller.mu_rho),
                 station(scenario),
             ),
+            in_world=mocap,
+            positions=position_bounds(scenario),
         )
 
     @kernel
@@ -90,10 +99,44 @@ class AssumedErrors(NamedTuple):
         return RateErrors(errors.M_rho, errors.M_alpha2), inputs
 
 
+def position_bounds(scenario: Scenario) -> PositionBounds:
+    """What a scenario lets assume of positions: three standard deviations on each axis, the leader's limits.
+
+    In the direction in which both axes err that is a root of two more.
+    """
+    eps, leader = math.sqrt(2.0) * _SIGMAS * scenario.estimator.sigma_position, scenario.leader
+    acceleration = float(leader_acceleration(leader.k_v, leader.k_u))
+    worst = filter_responses(scenario, eps)
+    return PositionBounds(
+        leader=eps,
+        follower=eps,
+        acceleration=acceleration,
+        k_v=leader.k_v,
+        longest=float(guaranteed_window(eps, acceleration)),
+        response=worst.velocity,
+        reach=worst.position,
+    )
+
+
+def filter_responses(scenario: Scenario, eps: float) -> Responses:
+    """Largest errors of the scenario's filter under noise within eps [m]; infinite where it is another one.
+
+    Those of the extended filter with the process noise that the scenario tells, at its frame rate.
+    """
+    given, leader = scenario.estimator, scenario.leader
+    if (given.kind, given.front_end) != ("ekf", "world"):
+        return Responses(math.inf, math.inf)
+    flying = FlyingFilter(
+        given.sigma_position, 1.0 / scenario.mocap.rate_hz, process_noise(scenario), leader_limits(scenario)
+    )
+    acceleration = float(leader_acceleration(leader.k_v, leader.k_u))
+    return worst_responses(flying, Disturbances(eps, acceleration))
+
+
 def _own_motion_noise(scenario: Scenario) -> tuple[float, float]:
     """Standard deviations of v2 [m/s] and u2 [rad/s], by where the estimator has them from."""
     given = scenario.estimator
-    if given.own_motion == "odometry":
+    if given.own_motion in ("odometry", "auto"):
         return given.sigma_v2, given.sigma_u2
     odometry = (
         FollowerMotion(0.0, 0.0, given.sigma_v2, given.sigma_u2) if given.own_motion == "fused" else None
@@ -116,12 +159,11 @@ def perceived(estimate: Estimate) -> Perceived:
 
 
 @kernel
-def bounds_of(estimate: Estimate, assumed: AssumedErrors) -> MomentBounds:
-    """Extended bounds of v1 [m/s], alpha1 [rad] and h [rad/s] of an estimate, its jump included."""
-    rho = max(estimate.rho, 1e-6)
-    errors = assumed.errors(rho)
-    if estimate.jump.since_ns != 0:
-        errors = _with_jump(errors, estimate, rho)
+def bounds_of(estimate: Estimate, assumed: AssumedErrors, window: WindowVelocity) -> MomentBounds:
+    """Bounds of v1 [m/s], alpha1 [rad] and h [rad/s] of an estimate, its jump included.
+
+    In the mocap frame by the positions of the window behind it, else in the extended form.
+    """
     seen = Moment(
         estimate.rho,
         estimate.alpha2,
@@ -131,6 +173,20 @@ def bounds_of(estimate: Estimate, assumed: AssumedErrors) -> MomentBounds:
         estimate.v2,
         estimate.u2,
     )
+    if assumed.in_world:
+        found = position_errors(seen, window, assumed.positions)
+        if estimate.jump.since_ns != 0:
+            aside = estimate.jump.position / window.span if window.jumped else 0.0
+            found = found._replace(
+                speed=found.speed + aside,
+                velocity=found.velocity + aside,
+                line=found.line + estimate.jump.position,
+            )
+        return world_bounds_at(seen, found, assumed.law)
+    rho = max(estimate.rho, 1e-6)
+    errors = assumed.errors(rho)
+    if estimate.jump.since_ns != 0:
+        errors = _with_jump(errors, estimate, rho)
     return bounds_at(seen, errors, assumed.law)
 
 

@@ -6,6 +6,7 @@ of many fields lie in rows of the caller's, as to hand Python twenty numbers tak
 
 from __future__ import annotations
 
+from estimation.bounds.window_velocity import WindowVelocity
 from estimation.tracking.estimate import Estimate
 from formation.kernel import entry
 from formation.records import Buffer, Rows, borrowed, load, store
@@ -86,8 +87,9 @@ def write_estimate(
     """Fill :func:`hil.wire.templates.estimate_template` with an estimate; returns the length.
 
     ``estimates``, ``assumed``: one row. ``reason``: its number among ``reasons``. ``consumed``: how many of
-    the receipts are meant.
+    the receipts are meant. No window of positions stands behind it.
     """
-    estimate = load(Estimate, estimates, 0)
-    numbers = estimate_numbers(estimate, load(AssumedErrors, assumed, 0), reason, consumed, now_ns)
+    estimate, known = load(Estimate, estimates, 0), load(AssumedErrors, assumed, 0)
+    window = WindowVelocity(0.0, 0.0, 0.0, 0.0, 0.0, False)
+    numbers = estimate_numbers(estimate, window, known, reason, consumed, now_ns)
     return write_estimate_message(buffer, times_at, reasons, numbers, estimate.joint, borrowed(receipts))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from estimation.bounds.window_velocity import WindowVelocity
 from estimation.tracking.estimate import Estimate, Joint
 from formation.kernel import kernel
 from formation.records import Buffer, Rows, write_float
@@ -15,10 +16,15 @@ _ROW_BYTES = 5 * 8
 
 @kernel
 def estimate_numbers(
-    estimate: Estimate, assumed: AssumedErrors, reason: int, consumed: int, now_ns: int
+    estimate: Estimate,
+    window: WindowVelocity,
+    assumed: AssumedErrors,
+    reason: int,
+    consumed: int,
+    now_ns: int,
 ) -> EstimateNumbers:
-    """Numbers of the message that tells an estimate at a time."""
-    bound = bounds_of(estimate, assumed)
+    """Numbers of the message that tells an estimate at a time; ``window``: of the positions behind it."""
+    bound = bounds_of(estimate, assumed, window)
     return EstimateNumbers(
         estimate.capture_ns,
         estimate.measured_ns,

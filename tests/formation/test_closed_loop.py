@@ -9,9 +9,9 @@ import pytest
 from controllers.laws import LAWS, Gains
 from formation.angles import FloatArray, wrap
 from formation.closed_loop import FollowerLaw, IntegrationError, simulate_pair
-from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid
+from formation.leader import Constant, Impulse, LeaderProgram, Sinusoid, Table
 from formation.pose import Motion, Pose
-from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2, Shape, follower_pose, shape_of
+from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2, Shape, follower_pose, shape_of, shape_rates
 from formation.spacing import Spacing, lyapunov
 
 FIG2 = (
@@ -202,3 +202,93 @@ def test_times_must_increase() -> None:
     leader, follower, program, gains = FIG2
     with pytest.raises(ValueError, match="increasing"):
         simulate_pair(leader, follower, program, with_gains("ideal", gains), np.array([1.0, 1.0]))
+
+
+def at_constant_speed(v2: float, mu2: float = 2.0) -> FollowerLaw:
+    """Steering (4) alone: a follower that does not regulate its speed."""
+
+    def law(shape: Shape, v1: float, _u1: float) -> Motion:
+        across = (v1 * math.sin(shape.alpha1) + v2 * math.sin(shape.alpha2)) / shape.rho
+        return Motion(v2, -mu2 * math.cos(shape.alpha2) + across)
+
+    return law
+
+
+@pytest.mark.parametrize(("v2", "u1"), [(0.5, 0.0), (0.5, 0.1), (0.65, 0.3), (0.4, -0.2)])
+def test_a_follower_of_constant_speed_attracts_no_distance(v2: float, u1: float) -> None:
+    """Remark 2: abreast, v1 rho sin(alpha1) + v2 rho - u1 rho^2 / 2 never changes, whatever the steering."""
+    leader, times = Pose(0.0, 0.0, 0.0), np.linspace(0.0, 6.0, 61)
+    levels = []
+    for rho in (0.45, 0.5, 0.6):
+        follower = follower_pose(Shape(rho, ABREAST_ALPHA1 + 0.1, ABREAST_ALPHA2), leader)
+        found = simulate_pair(leader, follower, Constant(0.5, u1), at_constant_speed(v2), times)
+        level = 0.5 * found.rho * np.sin(found.alpha1) + v2 * found.rho - 0.5 * u1 * found.rho**2
+        assert level == pytest.approx(np.full(len(times), level[0]), abs=1e-8)
+        levels.append(level[0])
+    # Three starts on three levels: no two of them can come to the same shape.
+    assert len({round(level, 6) for level in levels}) == 3
+    kept = simulate_pair(
+        leader,
+        follower_pose(Shape(0.6, ABREAST_ALPHA1, ABREAST_ALPHA2), leader),
+        Constant(0.5, 0.0),
+        with_gains("independent", FIG2[3]),
+        np.linspace(0.0, 40.0, 41),
+    )
+    assert kept.rho[-1] == pytest.approx(0.5, abs=1e-6)
+
+
+@pytest.mark.parametrize("gains", [FIG2[3], ROBOTS[3]], ids=["fig2", "robots"])
+def test_once_the_leader_drives_straight_the_error_decays(gains: Gains) -> None:
+    """After Prop. 2: from a swinging orbit V1 falls for good, at the rate of the slowest eigenvalue."""
+    v1 = 0.5 if gains.spacing.rho_0 == 0.5 else 0.08
+    turning = np.linspace(0.0, 20.0, 201)
+    program = Table([*turning, 20.01, 60.0], [v1] * 203, [*(0.4 * np.sin(turning)), 0.0, 0.0])
+    leader, rho_0 = Pose(0.0, 0.0, 0.0), gains.spacing.rho_0
+    follower = follower_pose(Shape(rho_0, ABREAST_ALPHA1, ABREAST_ALPHA2), leader)
+    times = np.linspace(0.0, 60.0, 601)
+    found = simulate_pair(leader, follower, program, with_gains("independent", gains), times)
+    straight = times > 20.05
+    value = np.array([lyapunov(found.shape_at(k), gains.spacing) for k in np.flatnonzero(straight)])
+    assert np.all(np.diff(value) <= 1e-12)
+    off = np.hypot(found.rho / rho_0 - 1.0, found.alpha1 - ABREAST_ALPHA1)
+    assert off[times < 20.0].max() > 0.1
+    assert off[-1] < 1e-5
+    reduced = np.array([[0.0, -v1], [v1 * gains.spacing.f_prime(rho_0), -gains.mu1]])
+    slowest = float(np.linalg.eigvals(reduced).real.max())
+    between = (int(np.searchsorted(times, 25.0)), int(np.searchsorted(times, 35.0)))
+    seen = math.log(off[between[1]] / off[between[0]]) / 10.0
+    assert seen == pytest.approx(slowest, rel=0.25)
+
+
+@pytest.mark.parametrize("mu2", [0.05, 1.0, 30.0])
+def test_near_the_formation_any_mu2_will_do(mu2: float) -> None:
+    """Remark 1 asks for a large one: at the equilibrium alpha2 does not feel the rest, whatever mu2 is."""
+    gains = Gains(1.5, mu2, Spacing(0.2, 20.0))
+    law, steady = with_gains("independent", gains), np.array([0.2, ABREAST_ALPHA1, ABREAST_ALPHA2])
+
+    def rates(state: FloatArray) -> FloatArray:
+        shape = Shape(*state.tolist())
+        return np.array(shape_rates(shape, Motion(0.08, 0.0), law(shape, 0.08, 0.0)))
+
+    steps = 1e-6 * np.eye(3)
+    jacobian = np.column_stack([(rates(steady + d) - rates(steady - d)) / 2e-6 for d in steps])
+    assert jacobian[2, :2] == pytest.approx(np.zeros(2), abs=1e-7)
+    assert jacobian[2, 2] == pytest.approx(-mu2, rel=1e-6)
+    assert np.linalg.eigvals(jacobian).real.max() < 0.0
+
+
+def test_far_from_the_manifold_twice_the_mu2_halves_what_it_costs() -> None:
+    """Of first order in 1 / mu2, as Remark 1 has it: what a start off the manifold does to the distance."""
+    leader, times = Pose(0.0, 0.0, 0.0), np.linspace(0.0, 8.0, 401)
+
+    def distances(mu2: float, alpha2: float) -> FloatArray:
+        follower = follower_pose(Shape(0.25, ABREAST_ALPHA1, alpha2), leader)
+        law = with_gains("independent", Gains(1.5, mu2, Spacing(0.2, 20.0)))
+        return simulate_pair(leader, follower, Constant(0.08, 0.2), law, times).rho
+
+    costs = [
+        float(np.abs(distances(mu2, ABREAST_ALPHA2 + 0.5) - distances(mu2, ABREAST_ALPHA2)).max())
+        for mu2 in (25.0, 50.0, 100.0)
+    ]
+    assert costs[0] / costs[1] == pytest.approx(2.0, abs=0.3)
+    assert costs[1] / costs[2] == pytest.approx(2.0, abs=0.2)

@@ -54,11 +54,11 @@ def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
         "frames": {"published", "received", "used", "lost", "late", "rejected"},
         "estimation": {
             *("evaluated_from_s", "samples", "untracked", "settle_s", "nis_mean"),
-            *("rmse", "max", "efficiency", "coverage_3sigma"),
+            *("rmse", "max", "efficiency", "coverage_3sigma", "nees", "nees_limits"),
         },
         "bounds": {
             *("M_rho", "M_alpha2", "v_eps", "checked", "violations", "tightness"),
-            *("input_errors_hold", "assumed"),
+            *("input_errors_hold", "assumed", "published", "largest_errors_seen"),
         },
         "certificate": parts["certificate"],
         "formation": {
@@ -77,8 +77,9 @@ def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
         "estimator",
         "law",
         "duration_s",
+        "findings",
     }
-    for name in ("rmse", "max", "efficiency", "coverage_3sigma"):
+    for name in ("rmse", "max", "efficiency", "coverage_3sigma", "nees", "nees_limits"):
         assert set(judged["estimation"][name]) == QUANTITIES
     assert set(judged["bounds"]["violations"]) == BOUNDS
     assert set(judged["formation"]["orbit_deviation_rms"]) == {"rho", "alpha1"}
@@ -188,7 +189,8 @@ def test_what_nobody_knows_is_absent(exact_run_data: RunData) -> None:
     assert set(summary["estimation"]) == {
         *("evaluated_from_s", "samples", "untracked", "settle_s", "nis_mean")
     }
-    assert set(summary["bounds"]) == {"M_rho", "M_alpha2", "v_eps", "checked"}
+    assert set(summary["bounds"]) == {"M_rho", "M_alpha2", "v_eps", "checked", "published"}
+    assert set(summary["bounds"]["published"]) == {"median", "says_something"}
     assert summary["bounds"]["checked"] == 0
     assert set(summary["frames"]) == {"received", "used", "late", "rejected"}
 

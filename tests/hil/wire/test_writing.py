@@ -6,6 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from estimation.bounds.window_velocity import NO_WINDOW
 from estimation.tracking.estimate import Estimate, Joint
 from estimation.tracking.track_point import NO_JUMP
 from estimation.tracking.tracker import Status
@@ -53,7 +54,7 @@ told = st.tuples(estimates, st.sampled_from(range(len(REASONS))), moments, recei
 
 
 def message_of(estimate: Estimate, reason: str, now_ns: int, consumed: list[Receipt]) -> msg.LeaderEstimate:
-    bound = bounds_of(estimate, ASSUMED)
+    bound = bounds_of(estimate, ASSUMED, NO_WINDOW)
     e, inputs = estimate, [msg.Consumed(each.digest % 2**64, to_time(each.received_ns)) for each in consumed]
     covariance = e.covariance.reshape(25)
     stamps = (header(e.capture_ns, "follower"), to_time(e.measured_ns), to_time(now_ns))
