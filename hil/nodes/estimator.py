@@ -16,6 +16,7 @@ from estimation.own_motion.odometry_correction import (
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.time.host_time import HostTime
 from estimation.tracking.estimate import Estimate
+from estimation.tracking.mount_check import is_off
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE
 from formation.records import load
 from hil.nodes.certifying import Believed, certifying
@@ -226,8 +227,11 @@ class EstimatorNode:
         """Diagnostics: status of the track, inputs taken and refused."""
         known = state.memory.known
         problem = "" if is_under_way(known, self.rules.step) else self._missing(known)
-        problem = problem or mount_problem(known.mount_check, stops=self.rules.step.mounts.stops)
+        stops = self.rules.step.mounts.stops
+        problem = problem or mount_problem(known.mount_check, stops=stops)
         values: dict[str, object] = {"status": state.memory.status(now_ns).name.lower()}
+        if stops and values["status"] == "tracking" and is_off(known.mount_check):
+            values["status"] = "rejecting"
         values |= mount_report(known.mount_check)
         values |= clock_report(state.times, state.memory.desk.time)
         values |= (
