@@ -107,18 +107,16 @@ def test_compiled_and_plain_give_the_same_bits() -> None:
         store(estimates, k, load(Estimate, estimates, k)._replace(v1=abs(speed)))
         store(robots, k, load(Robot, robots, k)._replace(heading=2.0 * k, motion=Motion(speed, 0.1 * k)))
     limits = row_of(LIMITS)
-    results = []
-    for run in (lambda function: function, interpreted):
-        watches, told, found = rows_of(TravelWatch, 8), copy_of(estimates), rows_of(Travel, 8)
-        run(followed)(watches, points, limits)
-        run(humbled)(told, 0.04)
-        run(way_gone)(robots, found)
-        results.append(
-            tuple(
-                load(kind, rows, k)
-                for kind, rows in ((TravelWatch, watches), (Estimate, told), (Travel, found))
-                for k in range(8)
-            )
-        )
-    same_bits(*results)
-    assert results[0][7].turned_ns > 0
+    compiled = rows_of(TravelWatch, 8), copy_of(estimates), rows_of(Travel, 8)
+    plain = rows_of(TravelWatch, 8), copy_of(estimates), rows_of(Travel, 8)
+    followed(compiled[0], points, limits)
+    interpreted(followed)(plain[0], points, limits)
+    humbled(compiled[1], 0.04)
+    interpreted(humbled)(plain[1], 0.04)
+    way_gone(robots, compiled[2])
+    interpreted(way_gone)(robots, plain[2])
+    for k in range(8):
+        same_bits(load(TravelWatch, compiled[0], k), load(TravelWatch, plain[0], k))
+        same_bits(load(Estimate, compiled[1], k), load(Estimate, plain[1], k))
+        same_bits(load(Travel, compiled[2], k), load(Travel, plain[2], k))
+    assert load(TravelWatch, compiled[0], 7).turned_ns > 0
