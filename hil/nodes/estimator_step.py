@@ -114,6 +114,10 @@ class MountRules(NamedTuple):
 NO_MOUNT_RULES = MountRules(NO_MOUNT, stops=False)
 
 
+SELDOM = 0.15
+"""Time [s] between measurements above which they tell too little of how a leader changes its motion."""
+
+
 class Rules(NamedTuple):
     """All that is fixed about an estimator.
 
@@ -440,6 +444,8 @@ def _learned(known: Known, memory: Memory, rules: Rules, verdict: int) -> Learne
     if verdict != USED:
         return known.process
     point = newest(memory.points, known.track)
+    if point.period > SELDOM:
+        return known.process
     return learn(known.process, memory.bank, point, rules.process_learning, rules.filter)
 
 
