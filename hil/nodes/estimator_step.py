@@ -84,6 +84,9 @@ from hil.nodes.own_motion_step import (
 
 _NS = 1e-9
 
+SELDOM = 0.15
+"""Time [s] between measurements above which they tell too little of how a leader changes its motion."""
+
 
 @kernel
 def with_robot(seen: PairSeen, rules: MountRules) -> PairSeen:
@@ -252,6 +255,8 @@ def _learned(known: Known, memory: Memory, rules: Rules, verdict: int) -> Learne
     if verdict != USED:
         return known.process
     point = newest(memory.points, known.track)
+    if point.period > SELDOM:
+        return known.process
     return learn(known.process, memory.bank, point, rules.process_learning, rules.filter)
 
 
