@@ -41,7 +41,7 @@ def estimate(
     them its own track tells its motion. ``scenario``: whose noise and limits of the leader the
     estimator goes by (``estimator.sigma_position``, ``leader.k_v`` ...). ``estimator``: ``ekf``, ``ukf``,
     ``imm`` ... ``smoother``, which looks at all rows for each, or your own. ``own_motion``: ``odometry``
-    (v2, u2), ``mocap`` (its track), ``fused`` (both), or ``auto``: odometry if it is there.
+    (v2, u2), ``mocap`` (its track), ``fused`` (both), or ``auto``: odometry while its track bears that out.
 
     Returns :class:`Estimates` with n rows. Raises :class:`UsageError`, one line, for arrays that do not fit
     together, times that do not increase, headings in degrees, and if no row gives an estimate.
@@ -84,9 +84,7 @@ def estimate(
 
 
 def _source(own_motion: str, motion: FloatArray | None) -> str:
-    if own_motion == "auto":
-        return "mocap" if motion is None else "odometry"
-    if motion is None and own_motion != "mocap":
+    if motion is None and own_motion not in ("auto", "mocap"):
         raise UsageError(
             f"own_motion is {own_motion!r}, but there are no v2 and u2; give both, or leave own_motion out"
         )

@@ -20,6 +20,18 @@ LONGEST_GAP_S = 0.1
 _STEP_S = 0.01
 
 
+@dataclass(frozen=True, slots=True)
+class LocalFit:
+    """A cubic over a window [s] around every step [s]; nothing is said of what lies in longer gaps [s]."""
+
+    step: float
+    window: float
+    longest_gap: float
+
+
+LOCAL_FIT = LocalFit(_STEP_S, WINDOW_S, LONGEST_GAP_S)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SmoothedMotion:
     """Poses (n, 3) x [m], y [m], theta [rad], and motion (n, 2) v [m/s], u [rad/s]; NaN where unknown."""
@@ -39,22 +51,44 @@ def smoothed_motion(
     """
     start_ns = int(stamps_ns[0])
     times, wanted = _seconds(stamps_ns, start_ns), _seconds(moments_ns, start_ns)
-    grid = np.arange(0.0, times[-1], _STEP_S)
-    length = 2 * round(0.5 * WINDOW_S / _STEP_S) + 1
-    if len(grid) < length:
+    grid, place, rate = _fitted(times, poses, LOCAL_FIT)
+    if not len(grid):
         unknown = np.full((len(wanted), 5), np.nan)
         return SmoothedMotion(unknown[:, :3], unknown[:, 3:])
+    forward = rate[:, 0] * np.cos(place[:, 2]) + rate[:, 1] * np.sin(place[:, 2])
+    fitted = np.column_stack([place, forward, rate[:, 2]])
+    rows = np.column_stack([np.interp(wanted, grid, column) for column in fitted.T])
+    rows[_unknown(times, wanted, LOCAL_FIT)] = np.nan
+    rows[:, 2] = wrap(rows[:, 2])
+    return SmoothedMotion(rows[:, :3], rows[:, 3:])
+
+
+def fitted_rates(
+    t: FloatArray, poses: FloatArray, fit: LocalFit
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Times (m,) [s] on an even grid, the track fitted there, headings unwrapped, and its rates (m, 3).
+
+    ``t`` (n,) [s], increasing; ``poses`` (n, 3). NaN where it is not known.
+    """
+    start = t[0] if len(t) else 0.0
+    grid, place, rate = _fitted(t - start, poses, fit)
+    unknown = _unknown(t - start, grid, fit)
+    place[unknown], rate[unknown] = np.nan, np.nan
+    return grid + start, place, rate
+
+
+def _fitted(times: FloatArray, poses: FloatArray, fit: LocalFit) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Grid from 0 on, and the fit on it; all empty for a track that is too short."""
+    grid = np.arange(0.0, times[-1] if len(times) else 0.0, fit.step)
+    length = 2 * round(0.5 * fit.window / fit.step) + 1 if len(grid) else 1
+    if len(grid) < length:
+        return np.empty(0), np.empty((0, 3)), np.empty((0, 3))
     free = poses.copy()
     free[:, 2] = np.unwrap(poses[:, 2])
     even = np.column_stack([np.interp(grid, times, column) for column in free.T])
     place = savgol_filter(even, length, DEGREE, axis=0)
-    rate = savgol_filter(even, length, DEGREE, deriv=1, delta=_STEP_S, axis=0)
-    forward = rate[:, 0] * np.cos(place[:, 2]) + rate[:, 1] * np.sin(place[:, 2])
-    fitted = np.column_stack([place, forward, rate[:, 2]])
-    rows = np.column_stack([np.interp(wanted, grid, column) for column in fitted.T])
-    rows[_unknown(times, wanted)] = np.nan
-    rows[:, 2] = wrap(rows[:, 2])
-    return SmoothedMotion(rows[:, :3], rows[:, 3:])
+    rate = savgol_filter(even, length, DEGREE, deriv=1, delta=fit.step, axis=0)
+    return grid, place, rate
 
 
 def poses_at(stamps_ns: NDArray[np.int64], poses: FloatArray, moments_ns: NDArray[np.int64]) -> FloatArray:
@@ -76,10 +110,13 @@ def _seconds(stamps_ns: NDArray[np.int64], start_ns: int) -> FloatArray:
     return (stamps_ns - start_ns).astype(np.float64) * 1e-9
 
 
-def _unknown(times: FloatArray, wanted: FloatArray) -> NDArray[np.bool_]:
+def _unknown(times: FloatArray, wanted: FloatArray, fit: LocalFit) -> NDArray[np.bool_]:
     """Which moments have an end or a gap of the track within half a window."""
-    half = 0.5 * WINDOW_S
-    unknown: NDArray[np.bool_] = (wanted < times[0] + half) | (wanted > times[-1] - half)
-    for before in np.flatnonzero(np.diff(times) > LONGEST_GAP_S):
+    half = 0.5 * fit.window
+    unknown: NDArray[np.bool_] = np.ones(len(wanted), np.bool_)
+    if not len(times):
+        return unknown
+    unknown = (wanted < times[0] + half) | (wanted > times[-1] - half)
+    for before in np.flatnonzero(np.diff(times) > fit.longest_gap):
         unknown |= (wanted > times[before] - half) & (wanted < times[before + 1] + half)
     return unknown

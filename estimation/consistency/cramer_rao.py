@@ -6,8 +6,9 @@ frame. The information obeys the recursion of Tichavsky, Muravchik and Nehorai (
 state. It is kept here as P = J^-1, which needs neither J nor Q to be inverted: these are the very steps of
 the EKF, taken at the truth.
 
-It bounds estimators that believe in the same process noise. A leader calmer than its noise (one that drives a
-smooth program, say) can be estimated better than this on average, so that RMSE / bound may fall below 1.
+It is a bound for random leaders, pushed about as the process noise says. A leader calmer than that (one that
+drives a smooth program, say) can be estimated better than this, so that RMSE / bound may fall below 1 without
+anybody having beaten a bound: that of a leader without process noise goes to zero with the length of the run.
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from estimation.filters.filter_states import Guess, Horizon, SensorOffsets, ShapeState
 from estimation.filters.gaussian import Gaussian, nis_of, started
+from estimation.filters.lever_arm import NO_LEVER, Lever
 from estimation.models import motion
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, Measurement
@@ -62,12 +63,16 @@ def innovation(belief: Belief, measurement: Measurement) -> Innovation:
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """Front end, leader limits, process noise, and correlation time [s] of the errors of v2 and u2."""
+    """Front end, leader limits, process noise, and correlation time [s] of the errors of v2 and u2.
+
+    ``lever``: where the leader's body sits; no estimator in matrices looks at it.
+    """
 
     front_end: FrontEnd
     limits: LeaderLimits
     noise: ProcessNoise
     input_correlation: float = 0.05
+    lever: Lever = NO_LEVER
 
     def start(self, measurement: Measurement) -> Belief:
         """Belief of one who knows the position only: w = 0 with sd k_v per axis, u1 = 0 with sd k_u."""

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol
 from estimation.filters.belief import Belief, Model, innovation
 from estimation.filters.filter import Kind, Stepped, filter_of
 from estimation.filters.gaussian import Gaussian
-from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, Measurement
 
 
@@ -106,6 +106,11 @@ class Interpreted:
         self.estimator = estimator
         self.limits: LeaderLimits = estimator.model.limits
         self.in_world = estimator.model.front_end is FrontEnd.WORLD
+        self.noise: ProcessNoise = estimator.model.noise
+
+    def driven_by(self, noise: ProcessNoise) -> Interpreted:
+        """Itself: what drives the leader is part of its model."""
+        return self
 
     @property
     def model(self) -> Model:
@@ -123,6 +128,14 @@ class Interpreted:
     def update(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
         """See :meth:`Estimator.update`."""
         return _remembering(self.estimator.update(whole_of(belief), measurement))
+
+    def widened(self, belief: Gaussian, by: float) -> Gaussian:
+        """Itself; see :meth:`~estimation.filters.filter.Filter.widened`."""
+        return belief
+
+    def leader(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
+        """See :meth:`~estimation.filters.filter.Filter.leader`; no lever arm is known of here."""
+        return belief
 
     def step(
         self, belief: Gaussian, dt: float, follower: FollowerMotion, measurement: Measurement, gate: float

@@ -13,7 +13,9 @@ from typing import NamedTuple
 from estimation.filters.belief import Model
 from estimation.filters.difference import differenced, first_difference
 from estimation.filters.ekf import extended_moved, informed, mean_of, seen_by_follower
-from estimation.filters.gaussian import Gaussian, nis_of, started
+from estimation.filters.gaussian import Gaussian, nis_of, started, widened
+from estimation.filters.leader_prior import standing_noise, within_limits
+from estimation.filters.lever_arm import NO_LEVER, Lever, is_centred, robot_under, swung
 from estimation.filters.ukf import unscented_moved
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, moved
 from estimation.models.measurement import FrontEnd, Measurement
@@ -29,6 +31,7 @@ class Kind(IntEnum):
     DIFFERENCE = 2
 
 
+EKF = Kind.EKF.value
 UKF = Kind.UKF.value
 DIFFERENCE = Kind.DIFFERENCE.value
 
@@ -43,7 +46,9 @@ class Stepped(NamedTuple):
 class Filter(NamedTuple):
     """A filter of a kind: ``in_world`` or along the follower's axes, with limits and noise of the leader.
 
+    Along the follower's axes, where sensors and odometry say less, the leader's limits are told all along.
     ``correlation`` [s]: of the errors of v2 and u2. ``cutoff`` [s]: of the low-pass behind differences.
+    ``lever``: where the body that mocap shows sits on the leader. Beliefs are about the body then.
     """
 
     kind: int
@@ -52,12 +57,18 @@ class Filter(NamedTuple):
     noise: ProcessNoise
     correlation: float
     cutoff: float
+    lever: Lever = NO_LEVER
 
     @property
     def model(self) -> Model:
         """The same model for estimators in matrices."""
         front_end = FrontEnd.WORLD if self.in_world else FrontEnd.BODY
-        return Model(front_end, self.limits, self.noise, self.correlation)
+        return Model(front_end, self.limits, self.noise, self.correlation, self.lever)
+
+    @kernel
+    def driven_by(self, noise: ProcessNoise) -> Filter:
+        """The same filter for a leader that is driven by other noise."""
+        return self._replace(noise=noise)
 
     @kernel
     def start(self, measurement: Measurement) -> Gaussian:
@@ -69,17 +80,19 @@ class Filter(NamedTuple):
     @kernel
     def predict(self, belief: Gaussian, dt: float, follower: FollowerMotion) -> Gaussian:
         """Belief after dt [s], the follower having moved as given."""
-        if self.kind == UKF:
-            ahead = unscented_moved(belief, dt, self.noise)
-        else:
-            ahead = extended_moved(belief, dt, self.noise)
+        noise = self.noise if self.in_world else standing_noise(belief, self.noise)
+        unscented = self.kind == UKF
+        ahead = unscented_moved(belief, dt, noise) if unscented else extended_moved(belief, dt, noise)
+        if not is_centred(self.lever):
+            ahead = swung(ahead, belief, self.lever, self.limits.v_eps, noise.q_u, dt)
         if self.kind == DIFFERENCE:
             rates = belief.rates
             ahead = ahead._replace(rates=rates._replace(elapsed=rates.elapsed + dt))
         if self.in_world:
             return ahead
         centre = moved(mean_of(belief), swing(belief.u, dt))
-        return seen_by_follower(ahead, centre, dt, follower, self.correlation)
+        seen = seen_by_follower(ahead, centre, dt, follower, self.correlation)
+        return seen if self.kind == DIFFERENCE else within_limits(seen, dt, self.noise, self.limits)
 
     @kernel
     def update(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
@@ -87,6 +100,18 @@ class Filter(NamedTuple):
         if self.kind == DIFFERENCE:
             return differenced(belief, measurement, self.limits, self.cutoff)
         return informed(belief, measurement.x, measurement.y, measurement.spread)
+
+    @kernel
+    def widened(self, belief: Gaussian, by: float) -> Gaussian:
+        """Belief whose measurements turn out to have had errors of a larger variance, by a factor."""
+        return widened(belief, by, self.limits)
+
+    @kernel
+    def leader(self, belief: Gaussian, measurement: Measurement) -> Gaussian:
+        """Belief about the leader itself, the newest measurement being given; sightings see no body."""
+        if is_centred(self.lever) or not measurement.framed:
+            return belief
+        return robot_under(belief, self.lever, self.limits.v_eps)
 
     @kernel
     def step(
@@ -106,4 +131,6 @@ class Filter(NamedTuple):
 def filter_of(kind: Kind, model: Model, cutoff: float = 0.1) -> Filter:
     """Filter of a kind on a model."""
     in_world = model.front_end is FrontEnd.WORLD
-    return Filter(kind.value, in_world, model.limits, model.noise, model.input_correlation, cutoff)
+    return Filter(
+        kind.value, in_world, model.limits, model.noise, model.input_correlation, cutoff, model.lever
+    )

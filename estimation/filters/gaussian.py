@@ -11,6 +11,7 @@ from estimation.models.coordinated_turn import LeaderLimits, Spread
 from estimation.models.motion import STATE_SIZE, Matrix, Vector
 from formation.kernel import kernel
 
+_LEAST = 1e-12  # of a variance that is divided by
 _ROWS, _COLUMNS = np.triu_indices(STATE_SIZE)
 
 
@@ -127,6 +128,31 @@ def started(x: float, y: float, spread: Spread, limits: LeaderLimits) -> Gaussia
         turn,
         Rates(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     )  # fmt: skip
+
+
+@kernel
+def widened(b: Gaussian, by: float, limits: LeaderLimits) -> Gaussian:
+    """Belief with its covariance larger by a factor, but not beyond that of one who knows the limits only."""
+    speed, turn = limits.k_v * limits.k_v, limits.k_u * limits.k_u
+    most = min(speed / max(b.vx_vx, b.vy_vy, _LEAST), turn / max(b.u_u, _LEAST))
+    f = max(1.0, min(by, most))
+    return b._replace(
+        x_x=f * b.x_x,
+        x_y=f * b.x_y,
+        x_vx=f * b.x_vx,
+        x_vy=f * b.x_vy,
+        x_u=f * b.x_u,
+        y_y=f * b.y_y,
+        y_vx=f * b.y_vx,
+        y_vy=f * b.y_vy,
+        y_u=f * b.y_u,
+        vx_vx=f * b.vx_vx,
+        vx_vy=f * b.vx_vy,
+        vx_u=f * b.vx_u,
+        vy_vy=f * b.vy_vy,
+        vy_u=f * b.vy_u,
+        u_u=f * b.u_u,
+    )
 
 
 @kernel

@@ -14,8 +14,12 @@ import numpy as np
 
 from estimation.models.coordinated_turn import FollowerMotion, Spread
 from estimation.models.motion import Matrix, Vector
+from formation.angles import wrapped
+from formation.arc import small_turn
 from formation.kernel import kernel
 from formation.pose import Pose
+
+NO_MOTION = FollowerMotion(0.0, 0.0, 0.0, 0.0)
 
 
 class FrontEnd(Enum):
@@ -48,6 +52,9 @@ class Measurement(NamedTuple):
     in_world: whether x and y are mocap's; the follower's pose is then that of ``seen``.
     framed: whether all this comes from a mocap frame, which is ``seen``, or from a sighting.
     noise: of the pose in ``seen``.
+    has_way, way: the follower's mean motion since the measurement before, where more of it is known than what
+    it was at both ends. anchored: x and y are along the axes of the *measured* pose, so that poses tell the
+    way between two of them without error, and the noise of the pose is not in the spread.
     """
 
     capture_ns: int
@@ -59,6 +66,9 @@ class Measurement(NamedTuple):
     framed: bool
     seen: PairSeen
     noise: PoseNoise
+    has_way: bool = False
+    way: FollowerMotion = NO_MOTION
+    anchored: bool = False
 
     @staticmethod
     def at(capture_ns: int, position: Vector, covariance: Matrix, motion: FollowerMotion) -> Measurement:
@@ -95,8 +105,11 @@ def measure_world(
 ) -> Measurement:
     """World front end: the leader's mocap position, with covariance sigma_p^2 I."""
     variance = noise.position * noise.position
+    still = FollowerMotion(0.0, 0.0, 0.0, 0.0)
     spread, seen = Spread(variance, 0.0, variance), PairSeen(leader[0], leader[1], follower)
-    return Measurement(capture_ns, leader[0], leader[1], spread, motion, True, True, seen, noise)
+    return Measurement(
+        capture_ns, leader[0], leader[1], spread, motion, True, True, seen, noise, False, still, False
+    )
 
 
 @kernel
@@ -129,8 +142,11 @@ def measure_body(
     """
     cos, sin, sd_across = math.cos(alpha2), math.sin(alpha2), rho * sd_alpha2
     spread = spread_of_sight(cos, sin, sd_rho * sd_rho, sd_across * sd_across)
+    still = FollowerMotion(0.0, 0.0, 0.0, 0.0)
     noise, seen = PoseNoise(0.0, 0.0), PairSeen(0.0, 0.0, Pose(0.0, 0.0, 0.0))
-    return Measurement(capture_ns, rho * cos, rho * sin, spread, motion, False, False, seen, noise)
+    return Measurement(
+        capture_ns, rho * cos, rho * sin, spread, motion, False, False, seen, noise, False, still, False
+    )
 
 
 @kernel
@@ -149,5 +165,28 @@ def measure_body_from_mocap(
     along = 2.0 * noise.position * noise.position
     across = along + squared * noise.heading * noise.heading
     spread = spread_of_sight(x / rho, y / rho, along, across)
+    still = FollowerMotion(0.0, 0.0, 0.0, 0.0)
     seen = PairSeen(leader[0], leader[1], follower)
-    return Measurement(capture_ns, x, y, spread, motion, False, True, seen, noise)
+    return Measurement(capture_ns, x, y, spread, motion, False, True, seen, noise, False, still, False)
+
+
+@kernel
+def measure_body_anchored(
+    capture_ns: int, leader: tuple[float, float], follower: Pose, noise: PoseNoise, motion: FollowerMotion
+) -> Measurement:
+    """The same along the axes of the pose as it was measured: its heading's noise turns all there is alike.
+
+    What is left is that of both positions, 2 sigma_p^2 in every direction.
+    """
+    level = PoseNoise(noise.position, 0.0)
+    measured = measure_body_from_mocap(capture_ns, leader, follower, level, motion)
+    return measured._replace(noise=noise, anchored=True)
+
+
+@kernel
+def way_between(before: Pose, after: Pose, dt: float) -> FollowerMotion:
+    """Mean motion that leads from one pose to another in dt [s], as if there were no error in either."""
+    turn, dx, dy = wrapped(after.theta - before.theta), after.x - before.x, after.y - before.y
+    middle = before.theta + 0.5 * turn
+    chord = dx * math.cos(middle) + dy * math.sin(middle)
+    return FollowerMotion(chord / (small_turn(0.5 * turn).sinc * dt), turn / dt, 0.0, 0.0)

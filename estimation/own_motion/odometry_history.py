@@ -31,7 +31,8 @@ class InputTrust(NamedTuple):
     sd_v2 [m/s], sd_u2 [rad/s]: its noise while the motion is steady. delay [s]: how long the motion comes
     after its signal, as the wheels follow a command. lag [s]: by how much more than that it may come later;
     while the signal changes it is trusted that much less. v_max [m/s], u_max [rad/s]: what a follower may do
-    whose signal has not been heard; 0 for one that stands until then.
+    whose signal has not been heard; 0 for one that stands until then. slip_v, slip_u: share of v2 and u2 by
+    which slip may falsify them.
     """
 
     sd_v2: float
@@ -40,6 +41,8 @@ class InputTrust(NamedTuple):
     lag: float = 0.0
     v_max: float = 0.0
     u_max: float = 0.0
+    slip_v: float = 0.0
+    slip_u: float = 0.0
 
 
 class Correction(NamedTuple):
@@ -136,7 +139,12 @@ def follower_motion(
             math.sqrt(sd_v2 * sd_v2 + change_v * change_v),
             math.sqrt(sd_u2 * sd_u2 + change_u * change_u),
         )
-    return FollowerMotion(correction.scale_v * now.v2, correction.scale_u * now.u2, sd_v2, sd_u2)
+    v2, u2 = correction.scale_v * now.v2, correction.scale_u * now.u2
+    if trust.slip_v > 0.0:
+        sd_v2 = math.sqrt(sd_v2 * sd_v2 + trust.slip_v * v2 * trust.slip_v * v2)
+    if trust.slip_u > 0.0:
+        sd_u2 = math.sqrt(sd_u2 * sd_u2 + trust.slip_u * u2 * trust.slip_u * u2)
+    return FollowerMotion(v2, u2, sd_v2, sd_u2)
 
 
 @kernel

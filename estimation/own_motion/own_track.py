@@ -81,12 +81,13 @@ class OwnSpread(NamedTuple):
 class OwnPoint(NamedTuple):
     """The filter right after one pose.
 
-    ``odometry``: of the same moment, if there is any. ``used_ns``: capture time of the newest pose that was
-    used. ``rejected``: poses since then.
+    ``noise``: of the pose, as it was known when it came. ``odometry``: of the same moment, if there is any.
+    ``used_ns``: capture time of the newest pose that was used. ``rejected``: poses since then.
     """
 
     capture_ns: int
     pose: Pose
+    noise: PoseNoise
     has_odometry: bool
     odometry: FollowerMotion
     state: OwnState
@@ -122,7 +123,7 @@ def own_begun(
         place, 0.0, 0.0, 0.0, 0.0, place, 0.0, 0.0, 0.0, heading, 0.0, 0.0, speed, 0.0, turn
     )  # fmt: skip
     state = OwnState(pose.x, pose.y, pose.theta, 0.0, 0.0)
-    return OwnPoint(capture_ns, pose, has_odometry, odometry, state, spread, capture_ns, 0)
+    return OwnPoint(capture_ns, pose, noise.pose, has_odometry, odometry, state, spread, capture_ns, 0)
 
 
 @kernel(inline=False)
@@ -133,7 +134,7 @@ def own_followed(last: OwnPoint, due: OwnPoint, noise: OwnNoise) -> OwnPoint:
     dt = (due.capture_ns - last.capture_ns) * _NS
     state, spread = _moved(last.state, dt), _spread_moved(last.state, last.spread, dt, noise)
     used_ns, rejected = due.capture_ns, 0
-    found = _with_pose(state, spread, due.pose, noise.pose)
+    found = _with_pose(state, spread, due.pose, due.noise)
     if found.nis > _POSE_GATE:
         used_ns, rejected = last.used_ns, last.rejected + 1
         if rejected >= _REACQUIRE:
@@ -336,4 +337,4 @@ def folded(track: Rows[OwnPoint], ring: Ring, due: OwnPoint, noise: OwnNoise, sp
 @kernel
 def own_reprocessed(point: OwnPoint, odometry: FollowerMotion, noise: OwnNoise) -> OwnPoint:
     """A point's pose, begun anew with the odometry that is now known of its moment."""
-    return own_begun(point.capture_ns, point.pose, True, odometry, noise)
+    return own_begun(point.capture_ns, point.pose, True, odometry, noise._replace(pose=point.noise))

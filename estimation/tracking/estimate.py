@@ -17,6 +17,9 @@ from formation.angles import wrapped
 from formation.kernel import kernel
 
 QUANTITIES = ("rho_dot", "alpha2_dot", "v1", "alpha1", "u1")
+GUESSED = math.pi * math.pi / 3.0
+"""Variance [rad^2] of an angle that may be any: uniform on the circle."""
+
 _LEAST = 1e-9  # of a distance [m] or speed [m/s] that is divided by
 _ROWS, _COLUMNS = np.triu_indices(len(QUANTITIES))
 
@@ -149,16 +152,30 @@ def estimate_of(
 
 
 @kernel
+def guessed_when_slow(estimate: Estimate, v_eps: float) -> Estimate:
+    """Estimate whose alpha1 is no better than a guess where the leader is slower than v_eps [m/s].
+
+    Who hardly moves has no direction of travel worth the name: it may stand, turn on the spot, or turn back.
+    More variance on the diagonal leaves the covariance positive semidefinite.
+    """
+    if estimate.v1 >= v_eps or estimate.joint.b_b >= GUESSED:
+        return estimate
+    return estimate._replace(joint=estimate.joint._replace(b_b=GUESSED))
+
+
+@kernel
 def along_own_axes(belief: Gaussian, measurement: Measurement, jump: JumpUncertainty) -> Gaussian:
     """Belief along the follower's axes; a mocap pose brings its own noise into it, a jump what it may be.
 
     Noise and jump act alike: on the leader's place in every direction, and by the own heading on everything.
     """
     b = belief
+    noise = measurement.noise
     if measurement.in_world:
-        pose, noise = measurement.seen.follower, measurement.noise
+        pose = measurement.seen.follower
         c, s = math.cos(pose.theta), math.sin(pose.theta)
         b = turned(b._replace(x=b.x - pose.x, y=b.y - pose.y), c, s)
+    if measurement.in_world or measurement.anchored:
         b = _blurred(b, noise.position * noise.position, noise.heading * noise.heading)
     return _blurred(b, jump.position * jump.position, jump.heading * jump.heading)
 

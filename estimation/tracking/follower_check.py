@@ -25,7 +25,8 @@ class Cause(IntEnum):
 
     GATED: the leader is not where the track has it. FOLLOWER: the follower is not where its own motion took
     it. FLIPPED: nor is its heading, but the opposite one would be. SWAPPED: the leader is where the follower
-    should be instead. FROZEN: a body that moves has the very pose of the frame before.
+    should be instead. FROZEN: a body that moves has the very pose of the frame before. MOUNT: frames are as
+    they should be, but the follower's heading is not its direction of travel.
     """
 
     NONE = 0
@@ -34,6 +35,7 @@ class Cause(IntEnum):
     FLIPPED = 3
     SWAPPED = 4
     FROZEN = 5
+    MOUNT = 6
 
     @property
     def word(self) -> str:
@@ -41,7 +43,7 @@ class Cause(IntEnum):
         return _WORDS[self]
 
 
-_WORDS = ("", "gated", "follower_outlier", "flipped_heading", "swapped", "frozen")
+_WORDS = ("", "gated", "follower_outlier", "flipped_heading", "swapped", "frozen", "wrong_mount")
 
 BELIEVED = Cause.NONE.value
 GATED = Cause.GATED.value
@@ -49,6 +51,7 @@ FOLLOWER = Cause.FOLLOWER.value
 FLIPPED = Cause.FLIPPED.value
 SWAPPED = Cause.SWAPPED.value
 FROZEN = Cause.FROZEN.value
+MOUNT = Cause.MOUNT.value
 
 
 class FollowerCheck(NamedTuple):

@@ -31,6 +31,7 @@ class Reported(NamedTuple):
 
     rho [m], alpha2 [rad]; the leader's v1 [m/s], alpha1 [rad], u1 [rad/s] and its variance; the follower's
     v2 [m/s], u2 [rad/s]; all at ``capture_ns``. ``measured_ns``: capture of the newest measurement in it.
+    ``cov_alpha1_u1``: [rad^2/s].
     """
 
     capture_ns: int
@@ -43,6 +44,7 @@ class Reported(NamedTuple):
     var_u1: float
     v2: float
     u2: float
+    cov_alpha1_u1: float
 
 
 class Sight(NamedTuple):

@@ -7,7 +7,7 @@ import math
 from estimation.filters.filter import Filter
 from estimation.filters.gaussian import Gaussian
 from estimation.models.coordinated_turn import mean_motion
-from estimation.models.measurement import Measurement
+from estimation.models.measurement import Measurement, way_between
 from estimation.tracking.follower_check import FollowerCheck, carried, check_from, misfit
 from estimation.tracking.track_point import JumpUncertainty, TentativeTrack
 from formation.angles import wrapped
@@ -27,7 +27,9 @@ def joined(
     capture_ns, motion, follower = measurement.capture_ns, measurement.motion, measurement.seen.follower
     if tentative.frames > 0:
         dt = (capture_ns - tentative.capture_ns) * _NS
-        own = mean_motion(tentative.motion, motion)
+        own = measurement.way if measurement.has_way else mean_motion(tentative.motion, motion)
+        if measurement.anchored and tentative.framed:
+            own = way_between(tentative.pose, follower, dt)
         stepped = estimator.step(tentative.belief, dt, own, measurement, gate)
         if stepped.nis <= gate and _follower_fits(tentative, measurement, dt, gate):
             return TentativeTrack(

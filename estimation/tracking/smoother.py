@@ -11,11 +11,12 @@ from collections.abc import Iterable
 import numpy as np
 
 from estimation.filters.gaussian import Gaussian
-from estimation.models.coordinated_turn import mean_motion
 from estimation.models.measurement import Measurement
 from estimation.models.motion import STATE_SIZE
+from estimation.tracking.follower_check import BELIEVED
+from estimation.tracking.follower_check import GATED as LEADER_OFF
 from estimation.tracking.track import Tracker
-from estimation.tracking.track_point import TrackPoint, Verdict, no_tentative
+from estimation.tracking.track_point import TrackPoint, Verdict, no_tentative, way_to
 
 _NS = 1e-9
 
@@ -59,7 +60,7 @@ def _carried_back(tracker: Tracker, here: TrackPoint, later: TrackPoint) -> Gaus
     """
     model, filtered = tracker.estimator.model, here.belief
     dt = (later.measurement.capture_ns - here.measurement.capture_ns) * _NS
-    follower = mean_motion(here.measurement.motion, later.measurement.motion)
+    follower = way_to(here, later.measurement, later.cause == BELIEVED or later.cause == LEADER_OFF, dt)
     move = model.transition(filtered.mean, dt, follower)
     noise = model.process_noise(filtered.mean, dt, follower)
     predicted = move @ filtered.covariance @ move.T + noise

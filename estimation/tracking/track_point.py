@@ -8,9 +8,11 @@ from typing import NamedTuple
 
 from estimation.filters.filter import Filter
 from estimation.filters.gaussian import Gaussian
-from estimation.models.coordinated_turn import FollowerMotion
-from estimation.models.measurement import Measurement
+from estimation.models.coordinated_turn import FollowerMotion, ProcessNoise, mean_motion
+from estimation.models.measurement import NO_MOTION, Measurement, way_between
 from estimation.tracking.follower_check import BELIEVED, FollowerCheck, check_from
+from estimation.tracking.follower_check import GATED as LEADER_OFF
+from estimation.tracking.manoeuvre import Manoeuvre, steady
 from formation.kernel import kernel
 from formation.pose import Pose
 
@@ -73,6 +75,9 @@ class TrackPoint(NamedTuple):
 
     verdict: a :class:`Verdict`; cause: why the measurement was not used, a
     :class:`~estimation.tracking.follower_check.Cause`. used_ns: capture time of the newest one that was used.
+    noise: what the leader was taken to be driven by. manoeuvre: what innovations tell of jumps of its motion.
+    period: typical time [s] from one measurement to the next, 0 while there was but one.
+    way, way_s: the follower's mean motion that the belief was moved by, and for how long [s].
     """
 
     measurement: Measurement
@@ -85,6 +90,11 @@ class TrackPoint(NamedTuple):
     check: FollowerCheck
     cause: int
     jump: JumpUncertainty
+    noise: ProcessNoise
+    manoeuvre: Manoeuvre
+    period: float = 0.0
+    way: FollowerMotion = NO_MOTION
+    way_s: float = 0.0
 
 
 @kernel
@@ -108,4 +118,33 @@ def begun(measurement: Measurement, estimator: Filter) -> TrackPoint:
         check_from(measurement),
         BELIEVED,
         JumpUncertainty(0.0, 0.0, 0),
+        estimator.noise,
+        steady(),
+        0.0,
+        FollowerMotion(0.0, 0.0, 0.0, 0.0),
+        0.0,
     )
+
+
+@kernel
+def way_to(last: TrackPoint, measurement: Measurement, believed: bool, dt: float) -> FollowerMotion:
+    """Mean motion of the follower over the dt [s] from a point to the measurement after it.
+
+    It is that between measured poses where belief and measurement are along their axes and the new one is
+    ``believed``, else what is known of the way, else the mean of the motions at both ends.
+    """
+    before = last.measurement
+    if measurement.anchored and before.anchored and believed:
+        shown = last.cause == BELIEVED or last.cause == LEADER_OFF
+        pose = before.seen.follower if shown else last.check.pose
+        return way_between(pose, measurement.seen.follower, dt)
+    return measurement.way if measurement.has_way else mean_motion(before.motion, measurement.motion)
+
+
+@kernel
+def next_period(period: float, dt: float) -> float:
+    """Typical time [s] between measurements after one more: it nears their median by steps of a tenth."""
+    if period <= 0.0:
+        return dt
+    step = 0.1 * period
+    return period + min(step, max(-step, dt - period))

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from estimation.filters.filter import Filter
 from estimation.filters.gaussian import Gaussian, sd_heading_of, speed_of
-from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, mean_motion
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits
 from estimation.models.measurement import Measurement
 from estimation.tracking.follower_check import (
     BELIEVED,
@@ -27,6 +27,7 @@ from estimation.tracking.follower_check import (
     checked,
 )
 from estimation.tracking.follower_check import GATED as LEADER_OFF
+from estimation.tracking.leader_step import followed_leader
 from estimation.tracking.reacquisition import joined, jumped, line_turn
 from estimation.tracking.track_point import (
     DUPLICATE,
@@ -37,13 +38,17 @@ from estimation.tracking.track_point import (
     JumpUncertainty,
     TrackPoint,
     begun,
+    next_period,
     no_tentative,
+    way_to,
 )
 from formation.kernel import kernel
 from formation.records import Rows, load, size, store
 from formation.ring import Ring, place
 
 _NS = 1e-9
+_COASTS, _LOST = 2.5, 8.0  # typical intervals without a measurement: coasting, lost
+_SLOWEST = 2.0  # [s] between measurements; what is slower is no track
 
 
 class Status(IntEnum):
@@ -73,11 +78,13 @@ class TrackSettings(NamedTuple):
 
     gate_probability: share of good measurements that pass a chi-square gate.
     reacquire_frames: rejected measurements that must agree with each other before they take over.
-    coast_after, lost_after, window: [s]. jump_uncertain_for: how long [s] a jump stays uncertain.
+    coast_after, lost_after, window: [s]; a track of slow measurements has some of their intervals.
+    jump_uncertain_for: how long [s] a jump stays uncertain.
     settled_heading, unsettled_heading: standard deviation of the leader's direction [rad] below which a track
     settles, and above which it no longer counts as settled.
     capped_speed: whether a leader that seems faster than k_v settles as one of k_v would.
     followed_turn: how far [rad] a jump may turn alpha1 and alpha2 for the track to follow it.
+    notices_manoeuvres: whether a run of innovations raises the process noise.
     """
 
     gate_probability: float = 0.9999
@@ -90,6 +97,7 @@ class TrackSettings(NamedTuple):
     unsettled_heading: float = 0.6
     capped_speed: bool = True
     followed_turn: float = 0.25
+    notices_manoeuvres: bool = False
 
 
 class Added(NamedTuple):
@@ -124,14 +132,20 @@ def is_settled(belief: Gaussian, before: bool, settings: TrackSettings, limits: 
 
 
 @kernel
+def lost_after(point: TrackPoint, settings: TrackSettings) -> float:
+    """Silence [s] after which a track is lost: what is told, or some of its own typical intervals."""
+    return max(settings.lost_after, _LOST * point.period)
+
+
+@kernel
 def status_of(point: TrackPoint, now_ns: int, settings: TrackSettings) -> int:
     """Status of a track's newest point for one who looks at it at ``now_ns``."""
     silence = (now_ns - point.used_ns) * _NS
-    if silence > settings.lost_after:
+    if silence > lost_after(point, settings):
         return LOST
     if point.verdict == GATED:
         return REJECTING
-    if silence > settings.coast_after:
+    if silence > max(settings.coast_after, _COASTS * point.period):
         return COASTING
     return TRACKING if point.settled else INITIALISING
 
@@ -148,24 +162,30 @@ def follow(
     """
     capture_ns, full_gate = measurement.capture_ns, gate_of(settings)
     found = _checked(last, measurement, full_gate, estimator)
-    if (capture_ns - last.used_ns) * _NS > settings.lost_after:
+    if (capture_ns - last.used_ns) * _NS > lost_after(last, settings):
         return _found(last, measurement, found, settings, estimator)
     # Nothing passes a negative gate: the belief is then the prediction.
     gate = full_gate if found.cause == BELIEVED else -1.0
     dt = (capture_ns - last.measurement.capture_ns) * _NS
-    motion = mean_motion(last.measurement.motion, measurement.motion)
-    stepped = estimator.step(last.belief, dt, motion, measurement, gate)
+    way = way_to(last, measurement, found.cause == BELIEVED, dt)
+    followed = followed_leader(last, measurement, way, gate, settings.notices_manoeuvres, estimator)
+    stepped = followed.stepped
     point = TrackPoint(
         measurement,
         stepped.belief,
         USED,
         stepped.nis,
         capture_ns,
-        is_settled(stepped.belief, last.settled, settings, estimator.limits),
+        is_settled(estimator.leader(stepped.belief, measurement), last.settled, settings, estimator.limits),
         no_tentative(stepped.belief),
         found.check,
         BELIEVED,
         _lasting(last.jump, capture_ns, settings),
+        estimator.noise,
+        followed.manoeuvre,
+        next_period(last.period, dt),
+        way,
+        dt,
     )
     if stepped.nis <= gate:
         return point
@@ -211,11 +231,14 @@ def _found(
             check=found.check,
             cause=found.cause,
         )
-    anew = begun(measurement, estimator)
+    # One that was lost for being slow is to be given the time that it takes.
+    apart = (measurement.capture_ns - last.measurement.capture_ns) * _NS
+    anew = begun(measurement, estimator)._replace(period=min(_SLOWEST, next_period(last.period, apart)))
     tentative = joined(last.tentative, measurement, estimator, gate_of(settings))
     if tentative.frames < settings.reacquire_frames:
         return anew._replace(tentative=tentative)
-    settled = is_settled(tentative.belief, False, settings, estimator.limits)
+    leader = estimator.leader(tentative.belief, measurement)
+    settled = is_settled(leader, False, settings, estimator.limits)
     return anew._replace(belief=tentative.belief, settled=settled)
 
 
@@ -235,11 +258,12 @@ def _taken_over(rejected: TrackPoint, settings: TrackSettings, estimator: Filter
         return rejected
     belief = estimator.update(prior, measurement) if leader_fits else tentative.belief
     check = check_from(measurement) if measurement.framed else rejected.check
+    leader = estimator.leader(belief, measurement)
     return rejected._replace(
         belief=belief,
         verdict=RESTARTED,
         used_ns=measurement.capture_ns,
-        settled=is_settled(belief, leader_fits and rejected.settled, settings, estimator.limits),
+        settled=is_settled(leader, leader_fits and rejected.settled, settings, estimator.limits),
         tentative=no_tentative(belief),
         check=check,
         cause=BELIEVED,
@@ -326,7 +350,7 @@ def _inserted(
     for at in range(n, k, -1):
         store(points, place(ring, points, at), point_at(points, ring, at - 1))
     here = point_at(points, ring, k)
-    store(points, place(ring, points, k), here._replace(measurement=measurement))
+    store(points, place(ring, points, k), here._replace(measurement=measurement, noise=estimator.noise))
     ring = Ring(ring.first, n + 1)
     reprocessed(points, ring, k, settings, estimator)
     here = point_at(points, ring, k)
@@ -362,7 +386,9 @@ def reprocessed(
     first = max(k, 1)
     point = point_at(points, ring, first - 1)
     for at in range(first, ring.length):
-        point = follow(point, point_at(points, ring, at).measurement, settings, estimator)
+        # By the noise that it had: what has been learned since is not for it.
+        old = point_at(points, ring, at)
+        point = follow(point, old.measurement, settings, estimator.driven_by(old.noise))
         store(points, place(ring, points, at), point)
     return ring.length - first
 

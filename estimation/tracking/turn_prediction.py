@@ -35,7 +35,7 @@ class TurnTrend(NamedTuple):
     """What was heard of the leader's turn rate: the newest estimate, its variance, and a low-pass of all.
 
     ``known``: whether any was; ``capture_ns`` of the newest; ``u1`` and ``slow`` in rad/s, ``variance`` in
-    rad^2/s^2.
+    rad^2/s^2; ``diffusion`` [rad^2/s^3] that the newest goes by.
     """
 
     known: bool
@@ -43,23 +43,28 @@ class TurnTrend(NamedTuple):
     u1: float
     variance: float
     slow: float
+    diffusion: float
 
 
-NO_TREND = TurnTrend(False, 0, 0.0, 0.0, 0.0)
+NO_TREND = TurnTrend(False, 0, 0.0, 0.0, 0.0, 0.0)
+
+_WIDEST = 1e3  # times more or less than told is no diffusion of a leader
 
 
 class TurnPrediction(NamedTuple):
     """What is known of the leader's steering: |u1| <= k_u [rad/s], and diffusion [rad^2/s^3] of u1.
 
-    ``spread``: variance S [rad^2/s^2] of u1 before anything is seen. Made by :meth:`of`.
+    ``spread``: variance S [rad^2/s^2] of u1 before anything is seen. ``inferred``: whether the filter finds
+    the diffusion by itself, so that ``diffusion`` is only what it began with. Made by :meth:`of`.
     """
 
     k_u: float
     diffusion: float
     spread: float
+    inferred: bool
 
     @staticmethod
-    def of(k_u: float, diffusion: float) -> TurnPrediction:
+    def of(k_u: float, diffusion: float, inferred: bool = False) -> TurnPrediction:
         """Prediction with the spread of sinusoidal steering to the limit.
 
         Raises :class:`ValueError` unless both numbers are positive and finite.
@@ -67,7 +72,25 @@ class TurnPrediction(NamedTuple):
         for name, value in (("k_u", k_u), ("diffusion", diffusion)):
             if not (value > 0.0 and math.isfinite(value)):
                 raise ValueError(f"{name} is {value}, expected a positive finite number")
-        return TurnPrediction(k_u, diffusion, 0.5 * k_u * k_u)
+        return TurnPrediction(k_u, diffusion, 0.5 * k_u * k_u, inferred)
+
+    @kernel
+    def seen_in(self, variance: float, with_alpha1: float) -> TurnPrediction:
+        """The same with the diffusion that an estimate goes by.
+
+        It follows from what the estimate reports: in the steady state the covariance of u1 and the leader's
+        heading is 2 q / w0^2, so that over the variance of u1 it is 1 / w0, half of the lag P / q.
+        ``with_alpha1``: covariance [rad^2/s] of u1 with alpha1, which falls as the heading grows.
+        """
+        if not self.inferred or not with_alpha1 < 0.0:
+            return self
+        least, most = self.diffusion / _WIDEST, self.diffusion * _WIDEST
+        return self._replace(diffusion=max(least, min(most, -0.5 * variance * variance / with_alpha1)))
+
+    @kernel
+    def of_trend(self, trend: TurnTrend) -> TurnPrediction:
+        """The same with the diffusion that a trend's newest estimate goes by."""
+        return self._replace(diffusion=trend.diffusion)
 
     @kernel
     def heard(
@@ -75,11 +98,12 @@ class TurnPrediction(NamedTuple):
     ) -> TurnTrend:
         """Trend with one more estimate in it; its capture lies ``ahead`` [s] before the command acts."""
         if not before.known:
-            return TurnTrend(True, capture_ns, u1, variance, u1)
+            return TurnTrend(True, capture_ns, u1, variance, u1, self.diffusion)
         since = max(0, capture_ns - before.capture_ns) * _NS
         window = 0.5 * behind(self, variance, ahead)
         share = -math.expm1(-since / window) if window > 0.0 else 1.0
-        return TurnTrend(True, capture_ns, u1, variance, before.slow + share * (u1 - before.slow))
+        slow = before.slow + share * (u1 - before.slow)
+        return TurnTrend(True, capture_ns, u1, variance, slow, self.diffusion)
 
     @kernel
     def predicted(self, trend: TurnTrend) -> float:
@@ -119,11 +143,18 @@ class TurnPrediction(NamedTuple):
 
 @kernel
 def held(turn_prediction: TurnPrediction, variance: float, ahead: float) -> float:
-    """Variance V [rad^2/s^2] of an estimate of u1 that is held for ``ahead`` [s]."""
-    return variance + turn_prediction.diffusion * ahead
+    """Variance V [rad^2/s^2] of an estimate of u1 that is held for ``ahead`` [s].
+
+    An inferred diffusion is that of the time P / q which the filter lags by. Steering is smooth, so that over
+    a longer time D it moves on by the square of it: V = P (D / (P / q))^2 in the place of q D.
+    """
+    walked = variance + turn_prediction.diffusion * ahead
+    if turn_prediction.inferred and variance > 0.0:
+        return walked * walked / variance
+    return walked
 
 
 @kernel
 def behind(turn_prediction: TurnPrediction, variance: float, ahead: float) -> float:
     """Time D [s] by which it is behind then."""
-    return held(turn_prediction, variance, ahead) / turn_prediction.diffusion
+    return (variance + turn_prediction.diffusion * ahead) / turn_prediction.diffusion

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from hil.log.report_json import print_json
 if TYPE_CHECKING:
     from estimation.calibration.sensor_bias import SensorBias
     from hil.replay.lab_calibration import Calibration
+    from hil.replay.mount_calibration import Mounts
 
 _MEANINGS = {
     "lag_s": "first-order lag of the robot's actuators",
@@ -27,29 +29,68 @@ _MEANINGS = {
 @click.command("calibrate")
 @click.argument("log", type=click.Path(path_type=Path))
 @click.option("--follower", metavar="NAME", help="Of a chain: the follower to look at.")
+@click.option("--map", "chart", metavar="FILE", help="Names the topics of a log that is not abreast's.")
 @click.option("--from", "from_s", type=Seconds(), metavar="S", help="Use what was measured from here on.")
 @click.option("--to", "to_s", type=Seconds(), metavar="S", help="Use what was measured up to here.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was found as one JSON object on stdout.")
-def command(log: Path, follower: str | None, from_s: float | None, to_s: float | None, as_json: bool) -> None:
+def command(
+    log: Path,
+    follower: str | None,
+    chart: str | None,
+    from_s: float | None,
+    to_s: float | None,
+    as_json: bool,
+) -> None:
     """Say what LOG tells of the lab that it was made in, and the settings that put it right.
 
     Commands and odometry tell the lag and delay of the robot, odometry and mocap frames how late the stamps
-    of mocap are, sightings and mocap poses by how much a range and bearing sensor is off.
+    of mocap are, sightings and mocap poses by how much a range and bearing sensor is off, and the poses
+    alone where the rigid bodies sit on their robots and how noisy they are.
 
     --from and --to are seconds since the first sighting or, for the timing, the first odometry; for imported
     recordings the source's own time.
     """
     from hil.log.reader import read_log
-    from hil.replay.lab_calibration import calibration_of
+    from hil.replay.lab_calibration import calibration_of, calibration_of_foreign
+    from hil.replay.topic_map import load_topic_map
 
     if from_s is not None and to_s is not None and to_s <= from_s:
         raise UsageError(f"--to {to_s:g}: expected more than --from {from_s:g}")
-    found = calibration_of(read_log(log), follower, from_s, to_s)
+    if chart is not None:
+        found = calibration_of_foreign(read_log(log), load_topic_map(chart, None, follower), from_s, to_s)
+    else:
+        found = calibration_of(read_log(log), follower, from_s, to_s)
     _say_timing(found)
     if found.offsets is not None:
         _say_offsets(log, found.offsets)
+    _say_mounts(found.mounts)
+    _say_noise(found.noise)
     if as_json:
         print_json(found.as_dict())
+
+
+def _say_mounts(found: Mounts) -> None:
+    """Print where bodies sit on their robots, and the lines of a scenario that say so."""
+    from hil.replay.mount_calibration import said
+
+    if not found.known:
+        return
+    click.echo(said("leader", found.leader), err=True)
+    click.echo(said("follower", found.follower), err=True)
+    click.echo("put into the scenario:", err=True)
+    for key, mount in found.settings.items():
+        section, _, name = key.partition(".")
+        click.echo(f"[{section}]\n{name} = [{', '.join(f'{value:g}' for value in mount)}]", err=True)
+
+
+def _say_noise(found: Mapping[str, float]) -> None:
+    """Print the lines of a scenario that tell the noise of the measurements."""
+    from hil.replay.noise_calibration import said_noise
+
+    if found:
+        click.echo(
+            f"measurements scatter by, with which bounds and estimates begin:\n{said_noise(found)}", err=True
+        )
 
 
 def _say_timing(found: Calibration) -> None:

@@ -122,14 +122,14 @@ def _emulator(order: Order) -> Worker:
     from hil.emulator.node import EmulatorNode
     from hil.live.node_worker import NodeWorker
 
-    return NodeWorker([EmulatorNode(order.scenario, order.needs)])
+    return NodeWorker([EmulatorNode(order.scenario, order.needs)], on_report=_on_report())
 
 
 def _estimator(order: Order) -> Worker:
     from hil.live.node_worker import NodeWorker
     from hil.nodes.link_nodes import estimator_node
 
-    return NodeWorker([estimator_node(link) for link in order.links])
+    return NodeWorker([estimator_node(link) for link in order.links], on_report=_on_report())
 
 
 def _controller(order: Order) -> Worker:
@@ -141,6 +141,7 @@ def _controller(order: Order) -> Worker:
         controllers,
         parting=_parting("controller", order),
         after_tick=remarks_on({node.law for node in controllers}),
+        on_report=_on_report(),
     )
 
 
@@ -154,7 +155,15 @@ def _follower(order: Order) -> Worker:
         within=[node.topics.estimate for node in controllers],
         parting=_parting("follower", order),
         after_tick=remarks_on({node.law for node in controllers}),
+        on_report=_on_report(),
     )
+
+
+def _on_report() -> Callable[[bytes], None]:
+    """What says on stderr what nodes find, once when it begins and once when it ends."""
+    from hil.live.finding_lines import FindingLines
+
+    return FindingLines(lambda line: click.echo(line, err=True)).hear
 
 
 def _parting(name: str, order: Order) -> Parting:

@@ -130,6 +130,7 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> str:
     from rich.text import Text
 
     from hil.live.daemon import Ending
+    from hil.live.finding_lines import FindingLines
     from hil.live.run import APART, TOGETHER, run_live
     from hil.live.run_monitor import Snapshot
     from hil.wire.session import reserved_endpoint
@@ -139,8 +140,11 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> str:
     console = Console(file=sys.stderr)
     starting = console.status(f"starting router, {', '.join(APART if live.apart else TOGETHER)}")
     with nullcontext(live.listen) if live.listen else reserved_endpoint() as endpoint, starting as status:
+        lines = FindingLines(lambda line: console.print(Text(line), soft_wrap=True))
 
         def show(snapshot: Snapshot, elapsed: float | None) -> None:
+            for node, findings in list(snapshot.findings.items()):
+                lines.note(node, findings)
             if elapsed is not None:
                 # What is on the wire may look like markup.
                 status.update(Text(snapshot.line(elapsed, scenario.run.duration_s)))

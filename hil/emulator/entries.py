@@ -8,7 +8,8 @@ from formation.pose import Motion, Pose
 from formation.records import Buffer, Indices, Rows, borrowed, load, store
 from hil.emulator.faults import Fault
 from hil.emulator.mocap import BodyNormals, SeenPose, Shares
-from hil.emulator.robot import Robot, pose_of
+from hil.emulator.odometry_faults import OdometryFault, Reckoning
+from hil.emulator.robot import Robot, pose_of, travelling
 from hil.emulator.world import (
     Happened,
     Lab,
@@ -43,6 +44,8 @@ def advance_world(
     shown: Rows[Pose],
     seen: Rows[SeenPose],
     odometry: Rows[Odometry],
+    odometry_faults: Rows[OdometryFault],
+    reckoned: Rows[Reckoning],
     until_ns: int,
 ) -> Happened:
     """Let the next thing happen that is due until a time; the rows are those of :class:`Memory`."""
@@ -57,6 +60,8 @@ def advance_world(
         borrowed(shown),
         borrowed(seen),
         borrowed(odometry),
+        borrowed(odometry_faults),
+        borrowed(reckoned),
     )
     step = advanced(load(World, world, 0), load(Lab, lab, 0), memory, until_ns)
     store(world, 0, step.world)
@@ -122,15 +127,15 @@ def tell_truth(
 ) -> None:
     """Fill :func:`hil.wire.templates.truth_template` with the k-th robot, a leader, and the next."""
     leader, follower = load(Robot, borrowed(robots), k), load(Robot, borrowed(robots), k + 1)
-    first, second = pose_of(leader), pose_of(follower)
+    led, second = travelling(leader), pose_of(follower)
     numbers = TruthNumbers(
         stamp_ns,
         number,
-        first.x,
-        first.y,
-        first.theta,
-        leader.motion.v,
-        leader.motion.u,
+        led.pose.x,
+        led.pose.y,
+        led.pose.theta,
+        led.motion.v,
+        led.motion.u,
         second.x,
         second.y,
         second.theta,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from formation.records import columns_of
 from hil.emulator.entries import tell_frame, tell_odometry, tell_truth
 from hil.emulator.lab_messages import MOCAP_FRAME, odometry_frames
 from hil.emulator.plant import Plant
@@ -37,9 +38,12 @@ class LabWriter:
         return Outgoing(topics.RIGID_BODIES, _FRAME, buffer.tobytes(), at_ns)
 
     def odometry(self, plant: Plant, slot: int, stamp_ns: int) -> Iterator[Outgoing]:
-        """The odometry in a slot, of each robot."""
+        """The odometry in a slot that arrives by this time, of each robot that has any."""
         first = slot * len(self._names)
+        arrive_ns = columns_of(plant.memory.odometry)["arrives_ns"]
         for k, (name, (buffer, numbers_at)) in enumerate(zip(self._names, self._odometry, strict=True)):
+            if arrive_ns[first + k] != stamp_ns:
+                continue
             tell_odometry(buffer, numbers_at, stamp_ns, plant.memory.odometry, first + k)
             yield Outgoing(f"{name}/odom", _ODOMETRY, buffer.tobytes(), stamp_ns)
 

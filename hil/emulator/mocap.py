@@ -14,6 +14,7 @@ import numpy as np
 
 from formation.angles import FloatArray, wrapped
 from formation.kernel import kernel
+from formation.mount import NO_MOUNT, Mount, body_pose
 from formation.pose import Pose
 from hil.emulator.robot import Robot
 
@@ -110,15 +111,16 @@ def whole_ns(seconds: float) -> int:
 
 
 @kernel
-def observe(robot: Robot, noise: MocapNoise, normal: BodyNormals) -> Pose:
-    """Pose as mocap sees it: the noise rises from its static share to full with the body's motion."""
+def observe(robot: Robot, noise: MocapNoise, normal: BodyNormals, mount: Mount = NO_MOUNT) -> Pose:
+    """Pose of a robot's body as mocap sees it: the noise rises from its static share to full with motion."""
     v, u = robot.motion.v / _FULL_NOISE_SPEED, robot.motion.u / _FULL_NOISE_TURN
     activity = min(1.0, math.sqrt(v * v + u * u))
     scale = noise.static_fraction + (1.0 - noise.static_fraction) * activity
+    body = body_pose(Pose(robot.at.x, robot.at.y, robot.heading), mount)
     return Pose(
-        robot.at.x + scale * noise.sigma_position * normal.x,
-        robot.at.y + scale * noise.sigma_position * normal.y,
-        wrapped(robot.heading + scale * noise.sigma_heading * normal.heading),
+        body.x + scale * noise.sigma_position * normal.x,
+        body.y + scale * noise.sigma_position * normal.y,
+        wrapped(body.theta + scale * noise.sigma_heading * normal.heading),
     )
 
 

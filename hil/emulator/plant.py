@@ -8,6 +8,7 @@ import numpy as np
 
 from formation.angles import FloatArray
 from formation.leader import encoded
+from formation.mount import Mount
 from formation.pose import Motion, Pose
 from formation.records import Rows, columns_of, load, row_of, rows_of, store
 from formation.ring import EMPTY, place
@@ -24,6 +25,7 @@ from hil.emulator.mocap import (
     block_length,
     draw_into,
 )
+from hil.emulator.odometry_faults import Reckoning, odometry_fault_rows
 from hil.emulator.robot import Actuators, Robot, standing
 from hil.emulator.world import (
     NO_NUMBERS,
@@ -65,6 +67,8 @@ def lab_of(scenario: Scenario) -> Lab:
         ),
         mocap.rate_hz,
         robot.odometry_rate_hz,
+        Mount(*map(float, mocap.leader_mount)),
+        Mount(*map(float, mocap.follower_mount)),
     )
 
 
@@ -106,9 +110,12 @@ def memory_of(scenario: Scenario, poses: tuple[Pose, ...], room: int = _ROOM) ->
         rows_of(Pose, robots),
         rows_of(SeenPose, room * robots),
         rows_of(Odometry, room * robots),
+        odometry_fault_rows(scenario.robot.odometry_faults),
+        rows_of(Reckoning, robots),
     )
     for k, pose in enumerate(poses):
         store(memory.robots, k, standing(pose))
+        store(memory.reckoned, k, Reckoning(pose, pose))
     columns_of(memory.underway)["slot"] = np.arange(room)
     return memory
 

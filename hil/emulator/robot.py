@@ -61,6 +61,13 @@ class Arcs(NamedTuple):
     decay: float
 
 
+class Travel(NamedTuple):
+    """Where a robot is and which way it goes, and its motion that way: v is never negative."""
+
+    pose: Pose
+    motion: Motion
+
+
 def standing(pose: Pose) -> Robot:
     """A robot at rest."""
     at = Course(pose.x, pose.y, math.cos(pose.theta), math.sin(pose.theta))
@@ -71,6 +78,18 @@ def standing(pose: Pose) -> Robot:
 def pose_of(robot: Robot) -> Pose:
     """Where a robot is, heading wrapped."""
     return Pose(robot.at.x, robot.at.y, wrapped(robot.heading))
+
+
+@kernel
+def travelling(robot: Robot) -> Travel:
+    """Pose and motion by the direction of travel: of one that drives backwards turned round, and forwards.
+
+    That is the truth of a leader, whom a follower knows by its positions.
+    """
+    pose, motion = pose_of(robot), robot.motion
+    if motion.v >= 0.0:
+        return Travel(pose, motion)
+    return Travel(Pose(pose.x, pose.y, wrapped(pose.theta + math.pi)), Motion(-motion.v, motion.u))
 
 
 @kernel

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 from formation.kernel import kernel
 from formation.leader import Program, TableRow, driven
-from formation.pose import Motion, Pose
+from formation.mount import Mount
+from formation.pose import STANDSTILL, Motion, Pose
 from formation.records import Rows, load, size, store
 from formation.ring import Ring, place, without_oldest
 from hil.emulator.faults import Fault, Pair, faulty
@@ -26,6 +27,7 @@ from hil.emulator.mocap import (
     seen_pose,
     whole_ns,
 )
+from hil.emulator.odometry_faults import OdometryFault, OdometryTwist, Reckoning, faulty_twist, reckoned
 from hil.emulator.robot import Actuators, Robot, arcs_of, drive, pose_of
 
 _NS = 1e-9
@@ -63,7 +65,7 @@ class OdometryError(NamedTuple):
 
 
 class Lab(NamedTuple):
-    """All that is fixed. Rates are in Hz."""
+    """All that is fixed. Rates are in Hz. Mounts: of the leader's body, and of every follower's."""
 
     actuators: Actuators
     program: Program
@@ -73,6 +75,8 @@ class Lab(NamedTuple):
     odometry: OdometryError
     mocap_rate: float
     odometry_rate: float
+    leader_mount: Mount
+    follower_mount: Mount
 
 
 class World(NamedTuple):
@@ -115,11 +119,15 @@ class Underway(NamedTuple):
     slot: int
 
 
+NEVER = -1
+
+
 class Odometry(NamedTuple):
-    """What a robot says of itself."""
+    """What a robot says of itself; ``arrives_ns``: when it does, as it is stamped, NEVER for not at all."""
 
     pose: SeenPose
     motion: Motion
+    arrives_ns: int
 
 
 class Memory(NamedTuple):
@@ -129,7 +137,8 @@ class Memory(NamedTuple):
     drawn, item k in row k modulo their number: ``normals`` n rows for each frame, ``shares`` one;
     ``odometry_normals`` as many for each robot, robot by robot. ``underway``: sorted by release time, then
     number; in the rows beyond the ring are free slots. A slot has n rows in ``seen`` and ``odometry``.
-    ``shown``: what the newest frame shows.
+    ``shown``: what the newest frame shows. ``odometry_faults``: of all robots but the leader.
+    ``reckoned``: of each robot.
     """
 
     robots: Rows[Robot]
@@ -142,6 +151,8 @@ class Memory(NamedTuple):
     shown: Rows[Pose]
     seen: Rows[SeenPose]
     odometry: Rows[Odometry]
+    odometry_faults: Rows[OdometryFault]
+    reckoned: Rows[Reckoning]
 
 
 class Happened(NamedTuple):
@@ -256,6 +267,11 @@ def sampled(world: World, lab: Lab, memory: Memory, slot: int) -> World:
     at_ns, number, error = world.time_ns, world.samples, lab.odometry
     robots = size(memory.robots)
     items = size(memory.odometry_normals) // robots
+    delay, t = error.delay, -1.0
+    if size(memory.odometry_faults) > 0 and world.motion_since_ns >= 0:
+        t = (at_ns - world.motion_since_ns) * _NS
+        delay = delay + _told(memory, lab, STANDSTILL, STANDSTILL, t).delay
+    arrives_ns = at_ns + whole_ns(delay)
     for k in range(robots):
         robot = load(Robot, memory.robots, k)
         normal = load(Motion, memory.odometry_normals, k * items + number % items)
@@ -264,14 +280,28 @@ def sampled(world: World, lab: Lab, memory: Memory, slot: int) -> World:
             error.scale_v * robot.motion.v + moving * error.sigma_v * normal.v,
             error.scale_u * robot.motion.u + moving * error.sigma_u * normal.u,
         )
-        store(memory.odometry, slot * robots + k, Odometry(seen_pose(pose_of(robot)), measured))
+        # Faults are those of followers: nobody drives by the leader's odometry.
+        told = _told(memory, lab, robot.motion, measured, t if k > 0 else -1.0)
+        wheels = Motion(error.scale_v * told.wheels.v, error.scale_u * told.wheels.u)
+        last = load(Reckoning, memory.reckoned, k)
+        here = reckoned(last, pose_of(robot), wheels, told.resets)
+        store(memory.reckoned, k, here)
+        sample = Odometry(seen_pose(here.told), told.told, NEVER if told.silent else arrives_ns)
+        store(memory.odometry, slot * robots + k, sample)
     next_ns = world.begun_ns + whole_ns((number + 1) / lab.odometry_rate)
     world = world._replace(samples=number + 1, sample_due_ns=next_ns)
-    arrives_ns = at_ns + whole_ns(error.delay)
     if arrives_ns == at_ns:
         return world
     item = Underway(arrives_ns, number, ODOMETRY, at_ns, arrives_ns, slot)
     return world._replace(underway=sent_off(world.underway, memory.underway, item))
+
+
+@kernel
+def _told(memory: Memory, lab: Lab, moves: Motion, measured: Motion, t: float) -> OdometryTwist:
+    """What becomes of a measured motion t [s] after the leader set off; all is well before."""
+    if t < 0.0:
+        return OdometryTwist(measured, Motion(1.0, 1.0), False, False, 0.0)
+    return faulty_twist(memory.odometry_faults, t, 1.0 / lab.odometry_rate, moves, measured)
 
 
 @kernel
@@ -306,7 +336,7 @@ def _led(world: World, lab: Lab, memory: Memory) -> World:
 @kernel
 def _shown(world: World, lab: Lab, memory: Memory, number: int) -> bool:
     """Put into ``shown`` what the motion capture shows now, faults included; False for no frame at all."""
-    pair = Pair(_observed(memory, lab.noise, number, 0), _observed(memory, lab.noise, number, 1))
+    pair = Pair(_observed(memory, lab, number, 0), _observed(memory, lab, number, 1))
     if size(memory.faults) > 0 and world.motion_since_ns >= 0:
         t, last = (world.time_ns - world.motion_since_ns) * _NS, pair
         if world.shown:
@@ -318,12 +348,12 @@ def _shown(world: World, lab: Lab, memory: Memory, number: int) -> bool:
     store(memory.shown, 0, pair.leader)
     store(memory.shown, 1, pair.follower)
     for k in range(2, size(memory.robots)):
-        store(memory.shown, k, _observed(memory, lab.noise, number, k))
+        store(memory.shown, k, _observed(memory, lab, number, k))
     return True
 
 
 @kernel(inline=False)
-def _observed(memory: Memory, noise: MocapNoise, number: int, k: int) -> Pose:
-    robots = size(memory.robots)
+def _observed(memory: Memory, lab: Lab, number: int, k: int) -> Pose:
+    robots, mount = size(memory.robots), lab.follower_mount if k > 0 else lab.leader_mount
     row = (number % size(memory.shares)) * robots + k
-    return observe(load(Robot, memory.robots, k), noise, load(BodyNormals, memory.normals, row))
+    return observe(load(Robot, memory.robots, k), lab.noise, load(BodyNormals, memory.normals, row), mount)

@@ -15,6 +15,7 @@ from estimation.tracking.estimate import QUANTITIES
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray, wrap
 from hil.judge.columns import Columns, EstimateColumns, inside
+from hil.judge.consistency import judge_nees
 from hil.judge.run_data import RunData, Span
 from hil.judge.true_states import Stamps, TrueStates
 from hil.scenario.leader_model import leader_limits, pose_noise, process_noise
@@ -37,6 +38,7 @@ def judge_estimation(run_data: RunData, columns: Columns) -> dict[str, object]:
     and ``coverage_3sigma`` (the share of errors within three of the estimate's own standard deviations): over
     the samples at which the quantity's truth is known. ``efficiency``: RMSE over the root mean square of the
     posterior Cramer-Rao bound at these samples; only for the world front end, whose noise it is about.
+    ``nees``, ``nees_limits``: see :func:`hil.judge.consistency.judge_nees`.
     """
     samples, estimates = columns.samples, columns.estimates
     nis = samples.nis[np.isfinite(samples.nis)]
@@ -53,6 +55,7 @@ def judge_estimation(run_data: RunData, columns: Columns) -> dict[str, object]:
         "max": {name: float(np.nanmax(np.abs(error))) for name, error in errors.items()},
         "efficiency": _efficiency(run_data, columns, rmse),
         "coverage_3sigma": _coverage(columns, errors),
+        **judge_nees(samples, errors),
     }
 
 

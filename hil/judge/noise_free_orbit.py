@@ -25,6 +25,9 @@ from hil.scenario.schema import Scenario
 STEP = 1.0 / 30.0
 """Step of the integration [s]; the error of a step of fourth order at the rates of these laws is < 1e-6."""
 
+_TURNED = 2.0
+"""No robot turns so far [rad] from one truth to the next; one that begins to drive backwards does, by pi."""
+
 Rowed = NDArray[np.void]
 
 
@@ -53,11 +56,12 @@ def noise_free_orbit(
     The follower drives what the scenario's law says on the true state, within the controller's limits, at
     once, and changes sides by ``orders``. Eq. (3) of the paper by the classical Runge-Kutta method on
     (ln rho, alpha1, alpha2), the leader's motion linear between the truths. None where the start or the
-    leader's motion is not known, or where the motion breaks down.
+    leader's motion is not known, where it turns back, so that alpha1 jumps, or where the motion breaks down.
     """
     inside = (truth.capture_ns >= run.from_ns) & (truth.capture_ns <= run.to_ns)
     known = inside & np.isfinite(truth.v1) & np.isfinite(truth.u1) & np.isfinite(truth.alpha1)
-    if np.count_nonzero(known) < 2:
+    turned = _turned_round(truth.leader[known, 2], truth.v1[known])
+    if np.count_nonzero(known) < 2 or turned is None:
         return None
     from_ns = int(truth.capture_ns[known][0])
     since = (truth.capture_ns[known] - from_ns) * 1e-9
@@ -66,8 +70,9 @@ def noise_free_orbit(
     moments = np.linspace(0.0, since[-1], 2 * steps + 1)
     driven = columns_of(rows_of(Motion, len(moments)))
     driven["v"], driven["u"] = (np.interp(moments, since, each[known]) for each in (truth.v1, truth.u1))
+    alpha1 = float(truth.alpha1[known][0])
     start = OrbitState(
-        math.log(truth.rho[known][0]), float(truth.alpha1[known][0]), float(truth.alpha2[known][0])
+        math.log(truth.rho[known][0]), alpha1 + math.pi if turned else alpha1, float(truth.alpha2[known][0])
     )
     due = [DueOrder((order.given_ns - from_ns) * 1e-9, order.side.sign) for order in orders]
     states = _integrate(scenario, start, driven, 2.0 * float(moments[1]), due)
@@ -76,6 +81,17 @@ def noise_free_orbit(
     with np.errstate(over="ignore"):
         rho = np.exp(states["log_rho"])
     return NoiseFreeOrbit(from_ns, moments[::2], rho, states["alpha1"], states["alpha2"])
+
+
+def _turned_round(direction: FloatArray, v1: FloatArray) -> bool | None:
+    """Whether a leader that stands at first drives off backwards; None where one turns back on its way.
+
+    ``direction`` of travel [rad] (n,), of one that stands its heading.
+    """
+    moving = direction[v1 > 0.0]
+    if np.any(np.abs(wrap(np.diff(moving))) > _TURNED):
+        return None
+    return bool(len(moving)) and abs(float(wrap(moving[0] - direction[0]))) > _TURNED
 
 
 def _integrate(

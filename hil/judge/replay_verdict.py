@@ -13,6 +13,7 @@ import numpy as np
 from hil import __version__
 from hil.errors import UsageError
 from hil.judge.certified import certified_violations
+from hil.judge.findings import found_again
 from hil.judge.run_data import (
     RunData,
     captured,
@@ -81,6 +82,7 @@ def _run_data(log: Log, played: Played) -> RunData:
     link = played.link
     if isinstance(played, KeptReplay):
         found = run_data_of_kept(log, played)
+        found = replace(found, found=found_again(found.found, played.found, link, same=bool(played.parity)))
         return found if link.in_chain else replace(found, certificate=own_certificate(log, link.scenario))
     found = run_data_of_link(log, link) if link.in_chain else run_data_of_log(log, link.scenario)
     return replace(
@@ -90,6 +92,8 @@ def _run_data(log: Log, played: Played) -> RunData:
         certified=played.certified,
         taken=played.estimator.taken,
         refused=played.estimator.refused,
+        noise_scale=played.estimator.noise_scale,
+        found=found_again(found.found, played.found, link, same=bool(played.parity)),
     )
 
 

@@ -10,12 +10,15 @@ import numpy as np
 
 from estimation.time.delay_line import Arrival
 from hil.errors import UsageError
+from hil.judge.findings import of_follower
 from hil.judge.frames import Frames, Numbered, frames_of
 from hil.judge.made_by import law_facts
 from hil.judge.side_orders import Order, orders_of
 from hil.judge.sound_messages import is_sound
 from hil.log.metadata import IMPORT, mode_of, recorded_certificate, scenario_of
 from hil.log.reader import Log, Record
+from hil.nodes.findings import Findings, all_found, findings_in
+from hil.nodes.noise_report import scale_in
 from hil.replay.kept import Kept, KeptReplay
 from hil.scenario.certificate import certificate_json, certificate_of
 from hil.scenario.certify import same_steps
@@ -61,7 +64,8 @@ class RunData:
     the log carries for this very scenario, None if it is to be worked out.
     ``orders``: to change sides, as they were given. ``kept``: what a replay in one pass has kept, in the
     place of estimates, commands, truth and arrivals, which are empty then. ``law``: what is to be said of a
-    law of one's own.
+    law of one's own. ``noise_scale``: noise of positions as it was found over what was told, None if it was
+    not looked for. ``found``: findings by the nodes' names, None where no node could have told any.
 
     A replay is judged on the run data of its log with its own estimates and counts put in by
     :func:`dataclasses.replace`.
@@ -87,6 +91,8 @@ class RunData:
     orders: Sequence[Order] = ()
     kept: Kept | None = None
     law: Mapping[str, Any] = field(default_factory=dict)
+    noise_scale: float | None = None
+    found: Mapping[str, Findings] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +173,8 @@ def run_data_of_link(log: Log, link: Link) -> RunData:
     """
     scenario, names = link.scenario, link_topics(link)
     records = _records(log, names)
-    counts = _last_counts(_decoded(log, records[topics.DIAGNOSTICS], DiagnosticArray))
+    reports = _decoded(log, records[topics.DIAGNOSTICS], DiagnosticArray)
+    counts = _last_counts(reports)
     estimator = counts.get(link.node_name("estimator"), {})
     estimates = _decoded(log, records[names.estimate], LeaderEstimate)
     truth = _decoded(log, records[names.truth], Truth)
@@ -190,6 +197,8 @@ def run_data_of_link(log: Log, link: Link) -> RunData:
         log=_facts(log),
         certificate=None if link.first else certificate_json(certificate_of(scenario, driven=False)),
         law=law_facts(log, counts.get(link.node_name("controller"), {})),
+        noise_scale=scale_in(estimator),
+        found=of_follower(all_found(map(findings_in, reports)), link) if reports else None,
     )
     return replace(run_data, zero_ns=_zero_ns(log, run_data))
 
@@ -217,6 +226,8 @@ def run_data_of_kept(log: Log, replay: KeptReplay) -> RunData:
         certificate=None if link.first else certificate_json(certificate_of(link.scenario, driven=False)),
         law=law_facts(log, kept.reports.get(link.node_name("controller"), {})),
         kept=kept,
+        noise_scale=replay.noise_scale,
+        found=of_follower(kept.found, link) if kept.reports else None,
     )
     return replace(run_data, zero_ns=_zero_ns(log, run_data))
 

@@ -16,9 +16,12 @@ from hil.judge.bounds import judge_bounds
 from hil.judge.certified import judge_certified
 from hil.judge.clock import arrival_rows, judge_clock
 from hil.judge.columns import Columns, columns_of
+from hil.judge.consistency import judged_findings
 from hil.judge.estimation import judge_estimation
+from hil.judge.findings import findings_list
 from hil.judge.formation import judge_formation
 from hil.judge.made_by import law_json
+from hil.judge.noise import certain, judge_noise, supported
 from hil.judge.published_bounds import judge_published
 from hil.judge.run_data import RunData
 from hil.log.report_json import known
@@ -38,12 +41,16 @@ def summarise(run_data: RunData) -> dict[str, Any]:
     strangers do not count. ``commands``: those from when the leader set off to the stop. ``seed`` and ``law``
     are absent for recordings that were not driven by them. ``certified``: only where estimates are certified.
     ``law``: a name, of one's own more (:func:`hil.judge.made_by.law_json`).
-    ``orders_refused``: why the scenario's own orders to change sides were, if they were.
-    ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it.
+    ``findings``: what nodes found to be wrong, and the judge (:mod:`hil.judge.findings`); absent where nobody
+    could have told. ``orders_refused``: why the scenario's own orders to change sides were, if they were.
+    ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it, and ``certified`` hold
+    no figures where ``noise`` says that the noise exceeds what they rest on.
     """
     columns = columns_of(run_data)
     given = run_data.scenario
     driven = run_data.motion_since_ns is not None
+    scale = run_data.noise_scale
+    estimation = judge_estimation(run_data, columns)
     summary = {
         "scenario": given.name,
         "seed": given.run.seed if driven else None,
@@ -52,17 +59,21 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "law": law_json(given, run_data.law) if driven or len(columns.commands.issued_ns) else None,
         "duration_s": columns.run.seconds,
         "frames": _frames(run_data),
-        "estimation": judge_estimation(run_data, columns),
+        "estimation": estimation,
         "bounds": judge_bounds(given, columns)
         | judge_assumptions(given, columns)
         | judge_published(given, columns),
-        "certified": judge_certified(run_data.certified, columns.truth, columns.span),
-        "certificate": run_data.certificate or certificate_json(certificate_of(given, driven=driven)),
+        "noise": judge_noise(scale),
+        "certified": certain(judge_certified(run_data.certified, columns.truth, columns.span), scale),
+        "certificate": supported(
+            run_data.certificate or certificate_json(certificate_of(given, driven=driven)), scale
+        ),
         "formation": judge_formation(run_data, columns),
         "latency_ms": _latency(columns),
         "clock": judge_clock(arrival_rows(run_data)),
         "commands": _commands(columns),
         "orders_refused": refusal(given) if driven else None,
+        "findings": findings_list(run_data.found, judged_findings(estimation)),
         "rejected": dict(run_data.refused),
         "log": None if run_data.log is None else asdict(run_data.log),
     }

@@ -12,6 +12,8 @@ from rich.table import Table
 from rich.text import Text
 
 from hil.judge.made_by import law_failure, made_by
+from hil.judge.noise import noise_warnings
+from hil.nodes.findings import finding_line
 
 GOOD, BAD, PLAIN = "green", "bold red", ""
 LEAST_COVERAGE = 0.97
@@ -44,11 +46,13 @@ def warnings_of(summary: Mapping[str, Any]) -> list[str]:
     """What deserves a second look, in plain words."""
     return [
         *_estimation_warnings(summary),
+        *noise_warnings(summary),
         *_assumption_warnings(summary),
         *_certified_warnings(summary),
         *_formation_warnings(summary),
         *_wire_warnings(summary),
         *filter(None, [law_failure(summary)]),
+        *map(finding_line, summary.get("findings", [])),
     ]
 
 
@@ -94,6 +98,7 @@ def _estimate_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]
     if parts:
         judged = f"({estimation['samples']} samples from {estimation['evaluated_from_s']:.3g} s on)"
         yield "estimate", f"RMSE {', '.join(parts)} {judged}", PLAIN
+    yield from _nees_line(estimation)
     yield from _bound_lines(summary)
 
 
@@ -118,6 +123,17 @@ def _bound_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
 def _times(broken: int) -> tuple[str, str]:
     """How often bounds were violated, in words, with its style."""
     return (f"{broken} times", BAD) if broken else ("nowhere", GOOD)
+
+
+def _nees_line(estimation: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    limits = estimation.get("nees_limits", {})
+    parts = []
+    for name in ("v1", "alpha1", "u1"):
+        if name in limits:
+            low, high = limits[name]
+            parts.append(f"{name} {estimation['nees'][name]:.2f} ({low:.2f} to {high:.2f})")
+    if parts:
+        yield "nees", f"squared errors over their variances: {', '.join(parts)}", PLAIN
 
 
 def _certified_line(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
@@ -194,7 +210,7 @@ def _estimation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     low = {
         name: share
         for name, share in estimation.get("coverage_3sigma", {}).items()
-        if name in ("v1", "alpha1") and share < LEAST_COVERAGE
+        if name in ("v1", "alpha1", "u1") and share < LEAST_COVERAGE
     }
     for name, share in low.items():
         yield f"the estimator is too sure of {name}: only {share:.1%} of errors within 3 standard deviations"

@@ -22,7 +22,7 @@ Stamps = NDArray[np.int64]
 _POSES = ("leader_x", "leader_y", "leader_theta", "follower_x", "follower_y", "follower_theta")
 _RECORDED = attrgetter(*_POSES, "v1", "u1", "v2", "u2")
 _RECORDED_SIZE, _SHAPE_SIZE = 10, 5
-_HEADINGS = [2, 5]
+_HEADINGS, _V1 = [2, 5], 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,8 +100,12 @@ def _states(moments_ns: Stamps, rows: FloatArray) -> TrueStates:
 def _with_shape(recorded: FloatArray) -> FloatArray:
     """Rows of both poses and both motions with the shape and its rates behind: Eqs. (2) and (3) of the paper.
 
-    NaN where both robots are in one place: there is no shape.
+    NaN where both robots are in one place: there is no shape. A leader that drives backwards is turned round,
+    as its alpha1 is that of its direction of travel.
     """
+    backwards = recorded[:, _V1] < 0.0
+    recorded[backwards, _HEADINGS[0]] += math.pi
+    recorded[backwards, _V1] *= -1.0
     recorded[:, _HEADINGS] = wrap(recorded[:, _HEADINGS])
     lx, ly, ltheta, fx, fy, ftheta, v1, _, v2, u2 = recorded.T
     dx, dy = fx - lx, fy - ly

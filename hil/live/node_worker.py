@@ -34,6 +34,7 @@ class NodeWorker:
     ``within``: topics on which one of the nodes speaks to another. Such a message goes to its listeners at
     once, and each takes it in at a time of its own, by ``clock`` [ns]; it is published before what they
     make of it, and nobody here listens to these topics on the wire. ``after_tick``: called after every tick.
+    ``on_report``: called with the diagnostics of every node.
     """
 
     thorough = False
@@ -45,6 +46,7 @@ class NodeWorker:
         parting: Parting | None = None,
         clock: Callable[[], int] = time.time_ns,
         after_tick: Callable[[], None] = lambda: None,
+        on_report: Callable[[bytes], None] = lambda _: None,
     ) -> None:
         # Listeners first: where all tick at once they have had theirs before they hear, later, of another's.
         self.nodes = tuple(sorted(nodes, key=lambda node: set(within).isdisjoint(node.subscribes)))
@@ -52,6 +54,7 @@ class NodeWorker:
         self._within = {topic: self._readers[topic] for topic in within if topic in self._readers}
         self.subscribes = tuple(topic for topic in self._readers if topic not in self._within)
         self._parting, self._clock, self._after_tick = parting, clock, after_tick
+        self._on_report = on_report
         self._states: list[Any] = []
         self._dues: list[int] = []
         self._now_ns = 0
@@ -111,6 +114,8 @@ class NodeWorker:
         self._states[place], self._dues[place] = state, node.due_ns(state)
         for message in said:
             yield message
+            if message.topic == topics.DIAGNOSTICS:
+                self._on_report(message.payload)
             if listeners := self._within.get(message.topic):
                 heard = Event(message.topic, message.payload)
                 for listener in listeners:

@@ -11,6 +11,7 @@ from typing import TypeVar
 import zenoh
 
 from estimation.tracking.tracker import Status
+from hil.nodes.findings import Findings, findings_in
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.messages import MalformedPayloadError, decode_as, to_ns
@@ -29,13 +30,14 @@ class Snapshot:
     """The newest of everything, by the follower that it is of.
 
     ``followers``: their names from the leader on. ``observed_s``: for how long we have looked. ``heard``: at
-    which ``observed_s`` each node last reported, ``problems``: what it said.
+    which ``observed_s`` each node last reported, ``problems``: what it said, ``findings``: what it found.
     """
 
     followers: tuple[str, ...] = ()
     observed_s: float = 0.0
     heard: dict[str, float] = field(default_factory=dict)
     problems: dict[str, str] = field(default_factory=dict)
+    findings: dict[str, Findings] = field(default_factory=dict)
     motion_since_ns: int | None = None
     estimates: dict[str, msg.LeaderEstimate] = field(default_factory=dict)
     certified: dict[str, msg.CertifiedEstimate] = field(default_factory=dict)
@@ -138,6 +140,7 @@ class RunMonitor:
             stamp_ns = to_ns(report.header.stamp)
         except MalformedPayloadError:
             return
+        self.snapshot.findings |= findings_in(report)
         for status in report.status:
             name = status.name.removeprefix("abreast/")
             self.snapshot.heard[name] = self.snapshot.observed_s

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controllers.follower import Command
+from estimation.consistency.process_estimate import MEMBERS, Member
+from estimation.own_motion.odometry_check import WayEntry
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.own_motion.own_track import OwnPoint
 from estimation.tracking.estimate import Estimate
@@ -28,6 +30,7 @@ class Share(NamedTuple):
     points: int
     history: int
     own: int
+    ways: int
     sent: int
 
 
@@ -127,6 +130,8 @@ class Rooms(NamedTuple):
     points: Rows[TrackPoint]
     history: Rows[MotionSample]
     own: Rows[OwnPoint]
+    ways: Rows[WayEntry]
+    bank: Rows[Member]
     sent: Rows[SentCommand]
     orders: Rows[Order]
     waiting: Rows[KeptEstimate]
@@ -142,6 +147,8 @@ def tracks_of(rooms: Rooms, share: Share, k: int) -> Tracks:
         part(TrackPoint, rooms.points, k * share.points, share.points),
         part(MotionSample, rooms.history, k * share.history, share.history),
         part(OwnPoint, rooms.own, k * share.own, share.own),
+        part(WayEntry, rooms.ways, k * share.ways, share.ways),
+        part(Member, rooms.bank, k * MEMBERS, MEMBERS),
     )
 
 

@@ -11,15 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.station_keeper import at_station
+from estimation.consistency.process_estimate import MEMBERS, Member
 from estimation.filters.filter import Filter
-from estimation.own_motion.odometry_history import IDEAL, MotionSample
+from estimation.own_motion.odometry_check import WayEntry
+from estimation.own_motion.odometry_history import MotionSample
 from estimation.own_motion.own_track import OwnPoint
 from estimation.tracking.prediction import SentCommand, rows_for
 from estimation.tracking.track_point import TrackPoint
 from formation.pose import Motion
 from formation.records import Rows, columns_of, row_of, rows_of, store
-from formation.ring import EMPTY
 from hil.emulator.mocap import BodyNormals, Shares, Stream, block_length, draw_into
+from hil.emulator.odometry_faults import Reckoning
 from hil.emulator.plant import lab_of, memory_of, world_at
 from hil.emulator.robot import standing
 from hil.emulator.world import Memory
@@ -40,7 +42,8 @@ from hil.lockstep.flight import (
 from hil.lockstep.lockstep import EPOCH_NS
 from hil.nodes.control_rules import control_rules
 from hil.nodes.controller_step import ControlRules, ControlState, begun
-from hil.nodes.estimator_memory import HISTORY, room_for, rules_of
+from hil.nodes.estimator_desk import NOTHING_KNOWN
+from hil.nodes.estimator_memory import HISTORY, WAYS, room_for, rules_of
 from hil.nodes.estimator_step import Known, Rules
 from hil.scenario.links import links_of
 from hil.scenario.ordered_sides import ordered_sides
@@ -108,6 +111,7 @@ class Flyer:
             points=room_for(window, _SPARE_RATE * scenario.mocap.rate_hz),
             history=room_for(HISTORY, _SPARE_RATE * scenario.robot.odometry_rate_hz),
             own=room_for(window, _SPARE_RATE * scenario.mocap.rate_hz),
+            ways=WAYS,
             sent=rows_for(control.max_age_s + control.transport_s),
         )
         after_ns, lab = round(after_s * 1e9), lab_of(scenario)
@@ -203,6 +207,8 @@ class Flyer:
             points,
             rows_of(MotionSample, n * share.history),
             rows_of(OwnPoint, n * share.own),
+            rows_of(WayEntry, n * share.ways),
+            rows_of(Member, n * MEMBERS),
             rows_of(SentCommand, n * share.sent),
             self._orders,
             rows_of(KeptEstimate, n * (self._in_flight + 1)),
@@ -222,11 +228,13 @@ class Flyer:
         store(self._flight, 0, self._start())
         for k, pose in enumerate(self._poses):
             store(lab.robots, k, standing(pose))
+            store(lab.reckoned, k, Reckoning(pose, pose))
         columns_of(lab.underway)["slot"] = np.arange(len(lab.underway))
+        columns_of(self.rooms.bank)[:] = 0
         for k, pair in enumerate(self._pairs):
             control = begun(at_station(station(pair)), EPOCH_NS)
             store(self.rooms.clocks, k, _NEW)
-            store(self.rooms.knowns, k, Known(EMPTY, EMPTY, EMPTY, IDEAL))
+            store(self.rooms.knowns, k, NOTHING_KNOWN)
             store(self.rooms.controls, k, control)
 
     def _draw(self, seed: int) -> None:

@@ -11,7 +11,7 @@ import math
 
 from controllers.guard import CLOCK_TOLERANCE_NS
 from estimation.models.measurement import PairSeen
-from estimation.own_motion.odometry_history import MotionSample
+from estimation.own_motion.odometry_check import OdometrySample
 from estimation.tracking.prediction import Reported
 from estimation.tracking.track_point import DUPLICATE, LATE
 from estimation.tracking.tracker import COASTING, LOST, newest, status_of
@@ -19,7 +19,7 @@ from formation.kernel import kernel
 from formation.pose import Motion
 from formation.records import load, size, store
 from hil.emulator.mocap import SeenPose
-from hil.emulator.robot import Robot, pose_of
+from hil.emulator.robot import Robot, pose_of, travelling
 from hil.emulator.world import (
     CAPTURE,
     FRAME,
@@ -64,9 +64,10 @@ from hil.nodes.controller_step import (
     heard_order,
     heard_stop,
 )
-from hil.nodes.estimator_step import MOCAP, Known, Rules
-from hil.wire.message_checks import ACCEPTED, place_cause, planar
-from hil.wire.records import Placement
+from hil.nodes.estimator_step import Known, Rules
+from hil.wire.message_checks import ACCEPTED, NOT_FINITE, check_odometry, place_cause, planar
+from hil.wire.records import Odometry as Message
+from hil.wire.records import Placement, stamp_of
 
 _NS = 1e-9
 _NEVER = 2**62
@@ -145,9 +146,8 @@ def _captured(flight: Flight, plan: Plan, rooms: Rooms, happened: Happened, arri
     world, n = flight.world, size(rooms.clocks)
     for k in range(n):
         ahead, behind = load(Robot, rooms.lab.robots, k), load(Robot, rooms.lab.robots, k + 1)
-        true = TrueFrame(
-            happened.at_ns, arrives, pose_of(ahead), pose_of(behind), ahead.motion, behind.motion
-        )
+        led = travelling(ahead)
+        true = TrueFrame(happened.at_ns, arrives, led.pose, pose_of(behind), led.motion, behind.motion)
         store(rooms.truth, happened.number * n + k, true)
     flight = flight._replace(captures=happened.number + 1)
     if world.motion_since_ns < 0:
@@ -197,6 +197,7 @@ def _seen(
 ) -> int:
     """The k-th estimator takes in its pair; the number of estimates on their way."""
     rules, tracks = load(Rules, rooms.rules, k), tracks_of(rooms, plan.share, k)
+    seen = estimator_step.with_robot(seen, rules.mounts)
     taken = estimator_step.take_frame(load(Known, rooms.knowns, k), tracks, rules, capture_ns, seen)
     store(rooms.knowns, k, taken.known)
     if taken.verdict in (DUPLICATE, LATE):
@@ -211,16 +212,28 @@ def _seen(
 def _odometry(plan: Plan, rooms: Rooms, happened: Happened) -> None:
     """Odometry has arrived, or was sampled: estimators take theirs, and the leader tells what it drives."""
     n = size(rooms.clocks)
-    if happened.kind != SAMPLE or plan.lab.odometry.delay == 0.0:
-        for k in range(n):
-            told = load(Odometry, rooms.lab.odometry, happened.slot * (n + 1) + k + 1)
-            sample = MotionSample(happened.stamp_ns, told.motion.v, told.motion.u)
-            tracks, rules = tracks_of(rooms, plan.share, k), load(Rules, rooms.rules, k)
-            known = load(Known, rooms.knowns, k)
-            store(rooms.knowns, k, estimator_step.take_odometry(known, tracks, rules, sample))
+    for k in range(n):
+        told = load(Odometry, rooms.lab.odometry, happened.slot * (n + 1) + k + 1)
+        if told.arrives_ns == happened.stamp_ns:
+            _heard(plan, rooms, k, told, happened.stamp_ns)
     if happened.kind == SAMPLE:
         u1 = load(Robot, rooms.lab.robots, 0).goal.u
         store(rooms.controls, 0, heard_leader(load(ControlState, rooms.controls, 0), u1))
+
+
+@kernel(inline=False)
+def _heard(plan: Plan, rooms: Rooms, k: int, told: Odometry, now_ns: int) -> None:
+    """The k-th estimator hears odometry now."""
+    known = load(Known, rooms.knowns, k)
+    message = Message(True, stamp_of(now_ns), _placed(told.pose), told.motion.v, told.motion.u)
+    motion = check_odometry(message, now_ns + CLOCK_TOLERANCE_NS)
+    if motion.cause == NOT_FINITE:
+        store(rooms.knowns, k, estimator_step.take_not_finite(known, now_ns))
+    if motion.cause != ACCEPTED:
+        return
+    sample = OdometrySample(motion.stamp_ns, motion.v2, motion.u2, motion.has_pose, motion.pose)
+    tracks, rules = tracks_of(rooms, plan.share, k), load(Rules, rooms.rules, k)
+    store(rooms.knowns, k, estimator_step.take_odometry(known, tracks, rules, sample))
 
 
 @kernel(inline=False)
@@ -242,7 +255,17 @@ def _told(flight: Flight, plan: Plan, rooms: Rooms, kept: KeptEstimate, now_ns: 
         flight = flight._replace(estimates=flight.estimates + 1)
     control = at_time(load(ControlState, rooms.controls, k), now_ns)
     reported = Reported(
-        e.capture_ns, e.measured_ns, e.rho, e.alpha2, e.v1, e.alpha1, e.u1, e.joint.u_u, e.v2, e.u2
+        e.capture_ns,
+        e.measured_ns,
+        e.rho,
+        e.alpha2,
+        e.v1,
+        e.alpha1,
+        e.u1,
+        e.joint.u_u,
+        e.v2,
+        e.u2,
+        e.joint.b_u,
     )
     if not can_be(reported, now_ns):
         store(rooms.controls, k, control)
@@ -308,8 +331,7 @@ def _estimator_tick(flight: Flight, plan: Plan, rooms: Rooms, k: int, now_ns: in
             waiting = 1
             clock = clock._replace(published_ns=now_ns)
     if not now_ns < clock.report_ns <= now_ns + _REPORT_NS:
-        moving = known.own.length if rules.source == MOCAP else known.odometry.length
-        well = clock.estimator_well or (known.track.length > 0 and moving > 0)
+        well = clock.estimator_well or estimator_step.is_under_way(known, rules)
         clock = clock._replace(report_ns=now_ns + _REPORT_NS, estimator_well=well)
     store(rooms.clocks, k, clock._replace(tick_ns=now_ns + _ESTIMATOR_TICK_NS))
     flight = _delivered(flight, plan, rooms, waiting, now_ns)

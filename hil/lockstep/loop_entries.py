@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from estimation.consistency.process_estimate import Member
+from estimation.own_motion.odometry_check import WayEntry
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.own_motion.own_track import OwnPoint
 from estimation.tracking.prediction import SentCommand
@@ -12,6 +14,7 @@ from formation.pose import Motion, Pose
 from formation.records import Rows, borrowed, load, store
 from hil.emulator.faults import Fault
 from hil.emulator.mocap import BodyNormals, SeenPose, Shares
+from hil.emulator.odometry_faults import OdometryFault, Reckoning
 from hil.emulator.robot import Robot
 from hil.emulator.world import Memory, Odometry, Underway
 from hil.lockstep.flight import (
@@ -43,6 +46,8 @@ def fly(
     shown: Rows[Pose],
     seen: Rows[SeenPose],
     odometry: Rows[Odometry],
+    odometry_faults: Rows[OdometryFault],
+    reckoned: Rows[Reckoning],
     clocks: Rows[Clock],
     knowns: Rows[Known],
     controls: Rows[ControlState],
@@ -51,6 +56,8 @@ def fly(
     points: Rows[TrackPoint],
     history: Rows[MotionSample],
     own: Rows[OwnPoint],
+    ways: Rows[WayEntry],
+    bank: Rows[Member],
     sent: Rows[SentCommand],
     orders: Rows[Order],
     waiting: Rows[KeptEstimate],
@@ -62,11 +69,13 @@ def fly(
     lab = Memory(
         borrowed(robots), borrowed(table), borrowed(faults), borrowed(normals), borrowed(shares),
         borrowed(odometry_normals), borrowed(underway), borrowed(shown), borrowed(seen), borrowed(odometry),
+        borrowed(odometry_faults), borrowed(reckoned),
     )  # fmt: skip
     rooms = Rooms(
         lab, borrowed(clocks), borrowed(knowns), borrowed(controls), borrowed(rules),
-        borrowed(control_rules), borrowed(points), borrowed(history), borrowed(own), borrowed(sent),
-        borrowed(orders), borrowed(waiting), borrowed(truth), borrowed(estimates), borrowed(commands),
+        borrowed(control_rules), borrowed(points), borrowed(history), borrowed(own), borrowed(ways),
+        borrowed(bank), borrowed(sent), borrowed(orders), borrowed(waiting), borrowed(truth),
+        borrowed(estimates), borrowed(commands),
     )  # fmt: skip
     flight = flown(load(Flight, flights, 0), load(Plan, plans, 0), rooms)
     store(flights, 0, flight)

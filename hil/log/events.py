@@ -76,7 +76,8 @@ def recorded_commands(log: Log, topic: str) -> list[Recorded]:
 def check_inputs(log: Log, scenario: Scenario) -> None:
     """Raise :class:`UsageError` if the log lacks what an estimator of the scenario lives on.
 
-    That is odometry of the follower, and mocap frames with both bodies or, for the body front end, sightings.
+    That is mocap frames with both bodies or, for the body front end, sightings; and odometry of the follower,
+    where its own poses do not tell its motion.
     """
     names = topics_of(scenario)
     if topics.RIGID_BODIES in log.topics:
@@ -91,7 +92,8 @@ def check_inputs(log: Log, scenario: Scenario) -> None:
             f"log {log.path}: has sightings, no mocap frames; expected estimator.front_end = 'body', "
             "correct the map or the scenario that it was made with"
         )
-    if names.odom not in log.topics:
+    posed = topics.RIGID_BODIES in log.topics and scenario.estimator.own_motion in ("auto", "mocap")
+    if names.odom not in log.topics and not posed:
         raise UsageError(
             f"log {log.path}: has no odometry of follower {names.follower!r}, expected topic {names.odom!r}; "
             f"{_there(log)}"

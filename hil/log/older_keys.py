@@ -10,7 +10,20 @@ from collections.abc import Mapping
 from copy import deepcopy
 from typing import Any
 
-BEFORE: dict[str, Any] = {}
+BEFORE: dict[str, Any] = {
+    "estimator.slip_v2": 0.0,
+    "estimator.slip_u2": 0.0,
+    "estimator.settled_heading": 0.0,
+    "estimator.noise": "given",
+    "controller.mount_check": "warn",
+    "leader.mount": [0.0, 0.0, 0.0],
+    "follower.mount": [0.0, 0.0, 0.0],
+    "mocap.leader_mount": [0.0, 0.0, 0.0],
+    "mocap.follower_mount": [0.0, 0.0, 0.0],
+    "robot.odometry_faults": [],
+    "estimator.own_motion": "odometry",
+    "estimator.process_noise": "given",
+}
 """Value of ``section.key`` for logs without it; a test asks for every key that a reference log lacks."""
 
 

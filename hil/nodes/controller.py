@@ -29,6 +29,7 @@ from hil.nodes.controller_desk import (
 from hil.nodes.controller_events import NOTHING, STOP, TICK, ControlEvent, Happening, happened
 from hil.nodes.controller_step import ControlState, begun
 from hil.nodes.counting import Count, counts_in
+from hil.nodes.findings import Findings, named_findings
 from hil.nodes.leader_turn import TurnSource, source_of
 from hil.nodes.node import LAW_FAILURE, Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
 from hil.scenario.brought import law_of
@@ -235,7 +236,12 @@ class ControllerNode:
         if self.law is not None and (failure := self.law.failure()):
             values[LAW_FAILURE] = failure
         values |= named_counts("decided", state.decided) | named_counts("refused", state.refused)
+        values |= named_findings(self.findings(state, now_ns))
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
+
+    def findings(self, state: ControllerState, now_ns: int) -> Findings:
+        """What is wrong with what the controller gets, as long as it is; reads rows, and takes no step."""
+        return {}
 
 
 def _side_report(station: StationState) -> dict[str, object]:

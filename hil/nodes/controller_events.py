@@ -32,7 +32,7 @@ class ControlEvent(NamedTuple):
     reported: Reported
 
 
-NO_REPORT = Reported(0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_REPORT = Reported(0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def happened(kind: Happening, number: float = 0.0) -> ControlEvent:

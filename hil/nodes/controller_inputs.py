@@ -34,7 +34,7 @@ from hil.wire.estimate_layout import read_estimate
 from hil.wire.message_checks import is_estimate
 from hil.wire.records import CommandNumbers, ReadEstimate
 
-_VAR_U1_BYTES = 24 * 8
+_COV_ALPHA1_U1_BYTES, _VAR_U1_BYTES = 19 * 8, 24 * 8
 _TICK, _ESTIMATE, _STOP = Happening.TICK.value, Happening.ESTIMATE.value, Happening.STOP.value
 _LEADER, _ORDER = Happening.LEADER.value, Happening.ORDER.value
 _COMMANDS, _MOVES_NOBODY = -1, -2
@@ -69,7 +69,10 @@ def _taken(state: ControlState, rules: ControlRules, event: ControlEvent, now_ns
 def _reported(payload: bytes, read: ReadEstimate) -> Reported:
     n = read.numbers
     var_u1 = read_float(payload, read.covariance_at + _VAR_U1_BYTES)
-    return Reported(n.capture_ns, n.measured_ns, n.rho, n.alpha2, n.v1, n.alpha1, n.u1, var_u1, n.v2, n.u2)
+    cov = read_float(payload, read.covariance_at + _COV_ALPHA1_U1_BYTES)
+    return Reported(
+        n.capture_ns, n.measured_ns, n.rho, n.alpha2, n.v1, n.alpha1, n.u1, var_u1, n.v2, n.u2, cov
+    )
 
 
 @kernel

@@ -28,7 +28,7 @@ from formation.line import Line
 from formation.pose import Motion
 from formation.records import Rows
 from formation.ring import EMPTY, Ring
-from hil.nodes.leader_turn import trend_with, turn_when_acting, turned_further
+from hil.nodes.leader_turn import TurnSpread, trend_with, turn_when_acting, turned_further
 
 INITIALISING, TRACKING, LOST = Status.INITIALISING.value, Status.TRACKING.value, Status.LOST.value
 
@@ -117,7 +117,7 @@ def at_time(state: ControlState, now_ns: int) -> ControlState:
     """
     if now_ns >= state.commanded_ns:
         return state
-    trend = TurnTrend(False, 0, 0.0, 0.0, 0.0)
+    trend = TurnTrend(False, 0, 0.0, 0.0, 0.0, 0.0)
     return state._replace(known=False, trend=trend, sent=Ring(0, 0))
 
 
@@ -137,7 +137,12 @@ def heard_estimate(
         return state
     ahead = (now_ns + rules.ahead_ns - reported.capture_ns) * _NS
     trend = trend_with(
-        rules.turn_prediction, state.trend, reported.capture_ns, reported.u1, reported.var_u1, ahead
+        rules.turn_prediction,
+        state.trend,
+        reported.capture_ns,
+        reported.u1,
+        TurnSpread(reported.var_u1, reported.cov_alpha1_u1),
+        ahead,
     )
     return state._replace(known=True, sight=sight_of(reported), trend=trend)
 

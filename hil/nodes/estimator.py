@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
+from estimation.bounds.certified import Certain, Failed
 from estimation.own_motion.odometry_correction import (
     NOTHING_SEEN,
     OdometryComparison,
@@ -12,15 +13,24 @@ from estimation.own_motion.odometry_correction import (
     with_pose,
     with_sample,
 )
+from estimation.own_motion.odometry_history import MotionSample
 from estimation.time.host_time import HostTime
 from estimation.tracking.estimate import Estimate
+from estimation.tracking.mount_check import is_off
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE
 from formation.records import load
 from hil.nodes.certifying import Believed, certifying
 from hil.nodes.estimator_inputs import RESTARTED, SEEN, SET_BACK, TICK_NS
 from hil.nodes.estimator_memory import EstimatorMemory, node_rules
+from hil.nodes.estimator_step import AUTO, MOCAP, Known, is_under_way
+from hil.nodes.findings import Findings, named_findings
 from hil.nodes.frame_time import clock_report
+from hil.nodes.leader_findings import leader_findings
+from hil.nodes.mount_report import mount_findings, mount_problem, mount_report
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
+from hil.nodes.noise_report import is_refuted, noise_findings, noise_report, scale_of
+from hil.nodes.odometry_findings import odometry_findings
+from hil.nodes.process_report import process_report
 from hil.nodes.sensor_offsets import offsets_report
 from hil.scenario.files import refuse_unrunnable
 from hil.scenario.schema import Scenario
@@ -78,6 +88,11 @@ class EstimatorState:
     def refused(self) -> Counts:
         """Inputs that were not used, by cause."""
         return self.memory.refused
+
+    @property
+    def noise_scale(self) -> float | None:
+        """Noise of positions as it is found over what is told, None where it is given."""
+        return scale_of(self.memory.known.noise, self.memory.rules.step.noise_learning)
 
 
 class EstimatorNode:
@@ -171,7 +186,9 @@ class EstimatorNode:
         if came != SEEN and not self._is_seen(state, came):
             return 0
         if self.aligns:
-            state.comparison = with_sample(state.comparison, memory.sample)
+            told = memory.sample
+            sample = MotionSample(told.stamp_ns, told.v2, told.u2)
+            state.comparison = with_sample(state.comparison, sample)
         memory.take_odometry()
         return 0
 
@@ -190,7 +207,9 @@ class EstimatorNode:
         if self.certifying is None:
             return (estimate,)
         newest = load(Estimate, state.memory.desk.newest, 0)
-        certain = self.certifying.certain(state.believed, state.memory.history, capture_ns)
+        certain: Certain | Failed = Failed.NOISE
+        if not is_refuted(state.noise_scale):
+            certain = self.certifying.certain(state.believed, state.memory.history, capture_ns)
         certified = certified_message(newest, certain, now_ns, self.topics.follower)
         return estimate, outgoing(self.topics.certified, certified, capture_ns)
 
@@ -207,17 +226,41 @@ class EstimatorNode:
     def report(self, state: EstimatorState, now_ns: int) -> Outgoing:
         """Diagnostics: status of the track, inputs taken and refused."""
         known = state.memory.known
-        moving = known.own if self.scenario.estimator.own_motion == "mocap" else known.odometry
-        problem = "" if known.track.length and moving.length else "waiting for mocap and odometry"
+        problem = "" if is_under_way(known, self.rules.step) else self._missing(known)
+        stops = self.rules.step.mounts.stops
+        problem = problem or mount_problem(known.mount_check, stops=stops)
         values: dict[str, object] = {"status": state.memory.status(now_ns).name.lower()}
+        if stops and values["status"] == "tracking" and is_off(known.mount_check):
+            values["status"] = "rejecting"
+        values |= mount_report(known.mount_check)
         values |= clock_report(state.times, state.memory.desk.time)
         values |= (
             offsets_report(state.memory.track[-1].belief)
             if self.scenario.estimator.bias_states and known.track.length
             else {}
         )
+        values |= noise_report(known.noise, self.rules.step.noise_learning)
+        values |= process_report(known.process, self.rules.step.process_learning)
         if self.aligns:
             applied = state.comparison.applied._asdict()
             values |= {f"odometry.{name}": value for name, value in applied.items()}
         values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)
+        values |= named_findings(self.findings(state, now_ns))
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
+
+    def findings(self, state: EstimatorState, now_ns: int) -> Findings:
+        """What is wrong with what the estimator gets, as long as it is; reads rows, and takes no step.
+
+        A replay in one pass asks too, and has loaded none of the node's own steps.
+        """
+        known, rules = state.memory.known, self.rules.step
+        found = {**mount_findings(known.mount_check), **odometry_findings(known, rules, now_ns)}
+        found |= noise_findings(known.noise, rules.noise_learning)
+        return {**found, **leader_findings(known.travel, now_ns)}
+
+    def _missing(self, known: Known) -> str:
+        """What the estimator waits for to begin."""
+        seen = "sightings" if self.rules.sensor.used and known.own.length == 0 else "mocap"
+        if known.track.length == 0 and self.rules.step.source in (MOCAP, AUTO):
+            return f"waiting for {seen}"
+        return f"waiting for {seen} and odometry"

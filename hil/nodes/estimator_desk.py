@@ -5,12 +5,17 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controllers.guard import CLOCK_TOLERANCE_NS
+from estimation.consistency.noise_estimate import NOISE_AS_TOLD, kept_noise
+from estimation.consistency.process_estimate import NOTHING_LEARNED, Member
 from estimation.models.measurement import PairSeen
+from estimation.own_motion.odometry_check import UNCHECKED, OdometrySample, WayEntry, without_track
 from estimation.own_motion.odometry_history import IDEAL, MotionSample
 from estimation.own_motion.own_track import OwnPoint
 from estimation.time.host_time import NO_TIME_YET, HostTime, TimeRows
 from estimation.tracking.estimate import Estimate
+from estimation.tracking.mount_check import NO_MOUNT_CHECK
 from estimation.tracking.track_point import TrackPoint
+from estimation.tracking.travel_watch import NO_TRAVEL
 from formation.kernel import kernel
 from formation.records import Buffer, Rows, load, store
 from formation.ring import EMPTY
@@ -75,7 +80,7 @@ NOTHING_NOTED = Notes(NO_TIME_YET, 0, 0, 0, 0, 0, False)
 
 
 class Desk(NamedTuple):
-    """Rows of a node: (1,) but for tracks, odometry, clock, receipts, counts and bodies.
+    """Rows of a node: (1,) but for tracks, odometry, ways, clock, receipts, counts and bodies.
 
     ``frame``, ``sample``, ``sighting``: the newest input, read and checked. ``newest``: the last estimate.
     ``buffer``: its message. ``heads``, ``bodies``, ``wanted``: as a frame is read.
@@ -85,13 +90,15 @@ class Desk(NamedTuple):
     points: Rows[TrackPoint]
     history: Rows[MotionSample]
     own: Rows[OwnPoint]
+    ways: Rows[WayEntry]
+    bank: Rows[Member]
     known: Rows[Known]
     time: TimeRows
     notes: Rows[Notes]
     receipts: Rows[Receipt]
     counts: Rows[Count]
     frame: Rows[TimedFrame]
-    sample: Rows[MotionSample]
+    sample: Rows[OdometrySample]
     sighting: Rows[Sighting]
     newest: Rows[Estimate]
     buffer: Buffer
@@ -102,7 +109,7 @@ class Desk(NamedTuple):
     @kernel
     def memory(self) -> Memory:
         """Where the tracks lie."""
-        return Memory(self.points, self.history, self.own)
+        return Memory(self.points, self.history, self.own, self.ways, self.bank)
 
 
 @kernel
@@ -115,7 +122,18 @@ def noted(desk: Desk, digest: int, now_ns: int) -> bool:
     return now_ns >= notes.heard_ns - CLOCK_TOLERANCE_NS
 
 
-NOTHING_KNOWN = Known(EMPTY, EMPTY, EMPTY, IDEAL)
+NOTHING_KNOWN = Known(
+    track=EMPTY,
+    odometry=EMPTY,
+    own=EMPTY,
+    correction=IDEAL,
+    odometry_check=UNCHECKED,
+    watched_ns=0,
+    noise=NOISE_AS_TOLD,
+    process=NOTHING_LEARNED,
+    travel=NO_TRAVEL,
+    mount_check=NO_MOUNT_CHECK,
+)
 
 
 @kernel
@@ -127,4 +145,8 @@ def forget(desk: Desk) -> None:
 @kernel
 def forget_tracks(desk: Desk) -> None:
     """Know nothing of where leader and follower are."""
-    store(desk.known, 0, load(Known, desk.known, 0)._replace(track=EMPTY, own=EMPTY))
+    known = load(Known, desk.known, 0)
+    # What was added up of the track does not hang together with what comes.
+    check = without_track(known.odometry_check)
+    noise = kept_noise(known.noise)
+    store(desk.known, 0, known._replace(track=EMPTY, own=EMPTY, odometry_check=check, noise=noise))

@@ -11,7 +11,7 @@ import math
 from controllers.guard import CLOCK_TOLERANCE_NS
 from estimation.bounds.window_velocity import window_velocity
 from estimation.models.measurement import PairSeen, from_sensor, measure_body
-from estimation.own_motion.odometry_history import MotionSample
+from estimation.own_motion.odometry_check import OdometrySample
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE
 from estimation.tracking.tracker import COASTING, LOST, status_of
 from estimation.tracking.tracker import newest as newest_point
@@ -27,7 +27,9 @@ from hil.nodes.frame_time import time_of
 from hil.nodes.refusals import (
     BAD_RANGE,
     NO_BODY_FRONT_END,
+    NOT_FINITE,
     NOT_REFUSED,
+    ODOMETRY_NOT_FINITE,
     SAME_PLACE,
     TAKEN_FRAME,
     TAKEN_LATE,
@@ -129,8 +131,9 @@ def frame_seen(desk: Desk, payload: bytes, names: bytes, again: bool, digest: in
     if math.sqrt(dx * dx + dy * dy) < _SAME_PLACE:
         count(desk.counts, SAME_PLACE)
         return came
-    follower = Pose(frame.follower_x, frame.follower_y, frame.follower_theta)
-    store(desk.frame, 0, TimedFrame(timed.capture_ns, PairSeen(frame.leader_x, frame.leader_y, follower)))
+    body = Pose(frame.follower_x, frame.follower_y, frame.follower_theta)
+    seen = step.with_robot(PairSeen(frame.leader_x, frame.leader_y, body), rules.step.mounts)
+    store(desk.frame, 0, TimedFrame(timed.capture_ns, seen))
     return came + SEEN
 
 
@@ -139,10 +142,15 @@ def odometry_seen(desk: Desk, payload: bytes, digest: int, now_ns: int) -> int:
     """Read the follower's odometry."""
     came = _received(desk, digest, now_ns)
     motion = check_odometry(read_odometry(payload), now_ns + CLOCK_TOLERANCE_NS)
+    if motion.cause == NOT_FINITE:
+        count(desk.counts, ODOMETRY_NOT_FINITE)
+        store(desk.known, 0, step.take_not_finite(load(Known, desk.known, 0), now_ns))
+        return came
     if motion.cause != NOT_REFUSED:
         count(desk.counts, motion.cause)
         return came
-    store(desk.sample, 0, MotionSample(motion.stamp_ns, motion.v2, motion.u2))
+    told = OdometrySample(motion.stamp_ns, motion.v2, motion.u2, motion.has_pose, motion.pose)
+    store(desk.sample, 0, told)
     count(desk.counts, TAKEN_ODOMETRY)
     return came + SEEN
 
@@ -184,11 +192,14 @@ def _take_sighting(desk: Desk, known: Known, rules: Rules) -> Taken:
     """Take the sighting that was seen into the leader's track."""
     memory, sensor = desk.memory(), load(NodeRules, desk.rules, 0).sensor
     seen = load(Sighting, desk.sighting, 0)
-    motion = step.by_odometry(known, memory, rules, seen.capture_ns)
-    measurement = measure_body(
-        seen.capture_ns, seen.rho, seen.alpha2, sensor.sigma_range, sensor.sigma_bearing, motion
-    )
-    return step.take(known, memory, rules, measurement)
+    if rules.source == step.AUTO:
+        motion = step.by_either_at(known, memory, rules, seen.capture_ns)
+    else:
+        motion = step.by_odometry(known, memory, rules, seen.capture_ns)
+    scale = known.noise.scale
+    sd_range, sd_bearing = scale.range * sensor.sigma_range, scale.bearing * sensor.sigma_bearing
+    measurement = measure_body(seen.capture_ns, seen.rho, seen.alpha2, sd_range, sd_bearing, motion)
+    return step.with_sight_noise(step.take(known, memory, rules, measurement), memory, rules)
 
 
 @kernel
@@ -200,7 +211,7 @@ def taken(desk: Desk, what: int, reasons: bytes, now_ns: int) -> int:
     """
     known, rules = load(Known, desk.known, 0), load(NodeRules, desk.rules, 0).step
     if what == ODOMETRY:
-        sample = load(MotionSample, desk.sample, 0)
+        sample = load(OdometrySample, desk.sample, 0)
         store(desk.known, 0, step.take_odometry(known, desk.memory(), rules, sample))
         return 0
     if what == FRAME:

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.consistency.process_estimate import MEMBERS, Member
 from estimation.filters.filter import Filter
+from estimation.own_motion.odometry_check import OdometrySample, WayEntry
 from estimation.own_motion.odometry_history import Correction, History, MotionSample
 from estimation.own_motion.own_track import OwnPoint
 from estimation.time.host_time import TimeRows, time_rows
@@ -35,12 +37,21 @@ from hil.nodes.estimator_desk import (
     SensorRules,
     TimedFrame,
 )
-from hil.nodes.estimator_step import FUSED, MOCAP, ODOMETRY, Known, Rules, Told, estimate
+from hil.nodes.estimator_step import AUTO, FUSED, MOCAP, ODOMETRY, Known, MountRules, Rules, Told, estimate
 from hil.nodes.frame_time import time_rules
 from hil.nodes.node import Counts
 from hil.nodes.refusals import COUNTED, REFUSALS, TAKEN, TAKEN_FRAME
 from hil.nodes.status_reasons import ALL_REASONS
-from hil.scenario.leader_model import input_trust, leader_filter, own_noise, pose_noise, track_settings
+from hil.scenario.leader_model import (
+    follower_mount,
+    input_trust,
+    leader_filter,
+    noise_learning,
+    own_noise,
+    pose_noise,
+    process_learning,
+    track_settings,
+)
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire.assumed_errors import AssumedErrors
@@ -54,12 +65,15 @@ from hil.wire.writing import MOST_RECEIPTS
 if TYPE_CHECKING:
     from hil.nodes.estimator_entries import Steps
 
-HISTORY = 2.0
+HISTORY = 4.0
 """Seconds of odometry kept, enough for the latest frame that the ring can take."""
+
+WAYS = 64
+"""Entries of the ways by which odometry is judged: more than six seconds of them."""
 
 _FASTEST = 1000.0  # messages a second; what comes faster pushes older ones out
 _LEAST_ROOM = 64
-_SOURCES = {"odometry": ODOMETRY, "mocap": MOCAP, "fused": FUSED}
+_SOURCES = {"odometry": ODOMETRY, "mocap": MOCAP, "fused": FUSED, "auto": AUTO}
 _REASONS = packed_texts(ALL_REASONS)
 _FRAME, _SIGHTING, _ODOMETRY = (
     kind.__msgtype__ for kind in (msg.RigidBodies, msg.RangeBearing, msg.Odometry)
@@ -79,6 +93,9 @@ def rules_of(scenario: Scenario) -> Rules:
         noise=pose_noise(scenario),
         trust=input_trust(scenario),
         own_noise=own_noise(scenario),
+        noise_learning=noise_learning(scenario),
+        process_learning=process_learning(scenario),
+        mounts=MountRules(follower_mount(scenario), scenario.controller.mount_check == "stop"),
     )
 
 
@@ -127,13 +144,15 @@ class EstimatorMemory:
             points=make(TrackPoint, room),
             history=rows_of(MotionSample, room_for(rules.step.span)),
             own=rows_of(OwnPoint, room),
+            ways=rows_of(WayEntry, WAYS),
+            bank=rows_of(Member, MEMBERS),
             known=row_of(NOTHING_KNOWN),
             time=time_rows(),
             notes=row_of(NOTHING_NOTED),
             receipts=rows_of(Receipt, MOST_RECEIPTS),
             counts=rows_of(Count, COUNTED),
             frame=rows_of(TimedFrame, 1),
-            sample=rows_of(MotionSample, 1),
+            sample=rows_of(OdometrySample, 1),
             sighting=rows_of(Sighting, 1),
             newest=rows_of(Estimate, 1),
             buffer=template.buffer,
@@ -158,7 +177,8 @@ class EstimatorMemory:
     def copy(self) -> EstimatorMemory:
         """The same memory, to go on from twice."""
         twin = EstimatorMemory(self.rules, self.reader, self._wanted, self._template)
-        for name in ("points", "history", "own", "known", "notes", "receipts", "counts", "newest"):
+        rows = ("points", "history", "own", "ways", "bank", "known", "notes", "receipts", "counts", "newest")
+        for name in rows:
             getattr(twin.desk, name)[:] = getattr(self.desk, name)
         for kept, other in zip(_columns(self.desk.time), _columns(twin.desk.time), strict=True):
             other[:] = kept
@@ -229,9 +249,9 @@ class EstimatorMemory:
         return load(TimedFrame, self.desk.frame, 0)
 
     @property
-    def sample(self) -> MotionSample:
+    def sample(self) -> OdometrySample:
         """The odometry that was seen last."""
-        return load(MotionSample, self.desk.sample, 0)
+        return load(OdometrySample, self.desk.sample, 0)
 
     @property
     def sighting(self) -> Sighting:

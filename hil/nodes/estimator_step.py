@@ -8,14 +8,47 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from estimation.consistency.noise_estimate import (
+    NOISE_GIVEN,
+    Moment,
+    NoiseEstimate,
+    NoiseLearning,
+    is_another,
+    noise_with_frame,
+    noise_with_sighting,
+    scaled_noise,
+)
+from estimation.consistency.process_estimate import (
+    MEMBERS,
+    LearnedProcess,
+    Member,
+    ProcessLearning,
+    learn,
+    learned_noise,
+    restarted,
+)
 from estimation.filters.filter import Filter
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import (
     Measurement,
     PairSeen,
     PoseNoise,
+    measure_body_anchored,
     measure_body_from_mocap,
     measure_world,
+)
+from estimation.own_motion.interval_motion import motion_between
+from estimation.own_motion.judged_odometry import age_of, aged, fresh_for, is_better, with_own_track
+from estimation.own_motion.odometry_check import (
+    POSE,
+    TRACK,
+    OdometryCheck,
+    OdometrySample,
+    WayEntry,
+    awaits_track,
+    source_of,
+    way_between,
+    with_sample,
 )
 from estimation.own_motion.odometry_history import (
     Correction,
@@ -39,11 +72,16 @@ from estimation.own_motion.own_track import (
     own_predicted,
     own_reprocessed,
 )
-from estimation.tracking.estimate import Estimate, estimate_at
-from estimation.tracking.follower_check import BELIEVED
+from estimation.tracking.estimate import Estimate, estimate_at, guessed_when_slow
+from estimation.tracking.follower_check import BELIEVED, MOUNT
+from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
 from estimation.tracking.follower_check import GATED as LEADER_OFF
-from estimation.tracking.track_point import DUPLICATE, GATED, LATE, TrackPoint
+from estimation.tracking.mount_check import MountCheck, is_off
+from estimation.tracking.mount_check import watched as mount_watched
+from estimation.tracking.track_point import DUPLICATE, GATED, LATE, RESTARTED, USED, TrackPoint
 from estimation.tracking.tracker import (
+    REJECTING,
+    TRACKING,
     TrackSettings,
     add,
     capture_at,
@@ -54,19 +92,34 @@ from estimation.tracking.tracker import (
     status_of,
     with_motion,
 )
+from estimation.tracking.travel_watch import TravelWatch, watched
 from formation.kernel import kernel
-from formation.records import Rows, store
+from formation.mount import NO_MOUNT, Mount, robot_pose
+from formation.records import Rows, load, store
 from formation.ring import Ring, place
 
-ODOMETRY, MOCAP, FUSED = 0, 1, 2
-"""Where the follower's motion is known from."""
+_NS = 1e-9
+
+ODOMETRY, MOCAP, FUSED, AUTO = 0, 1, 2, 3
+"""Where the follower's motion is known from; AUTO: from odometry while nothing speaks against it."""
+
+
+class MountRules(NamedTuple):
+    """Where the follower's body sits, and whether it is stopped if that is plainly wrong."""
+
+    follower: Mount
+    stops: bool
+
+
+NO_MOUNT_RULES = MountRules(NO_MOUNT, stops=False)
 
 
 class Rules(NamedTuple):
     """All that is fixed about an estimator.
 
     source: where the follower's motion is from. reprocesses: whether odometry that comes late is folded in
-    again. span: seconds of odometry kept. noise: of a mocap pose.
+    again. span: seconds of odometry kept. noise: of a mocap pose. mounts: of the follower's
+    body. noise_learning: by what the noise is put right.
     """
 
     settings: TrackSettings
@@ -77,23 +130,43 @@ class Rules(NamedTuple):
     noise: PoseNoise
     trust: InputTrust
     own_noise: OwnNoise
+    process_learning: ProcessLearning
+    mounts: MountRules = NO_MOUNT_RULES
+    noise_learning: NoiseLearning = NOISE_GIVEN
 
 
 class Memory(NamedTuple):
-    """Rows that an estimator works in: the leader's track, odometry, the follower's own track."""
+    """Rows that an estimator works in: the leader's track, odometry, the follower's own track, and more.
+
+    By the ``ways`` that both have gone odometry is judged. ``bank``: filters of other process noise, by which
+    that is found.
+    """
 
     points: Rows[TrackPoint]
     history: Rows[MotionSample]
     own: Rows[OwnPoint]
+    ways: Rows[WayEntry]
+    bank: Rows[Member]
 
 
 class Known(NamedTuple):
-    """Where the rows are filled, and by what odometry is corrected."""
+    """Where the rows are filled, by what odometry is corrected, and how far it is believed.
+
+    ``watched_ns``: capture of the first frame since when odometry is missed, 0 before. ``noise``: of
+    measurements, as they tell it. ``process``: what is known of how the leader drives. ``travel``: which
+    way the leader went, where it is seen in the world. ``mount_check``: what is left of the follower's mount.
+    """
 
     track: Ring
     odometry: Ring
     own: Ring
     correction: Correction
+    odometry_check: OdometryCheck
+    watched_ns: int
+    noise: NoiseEstimate
+    process: LearnedProcess
+    travel: TravelWatch
+    mount_check: MountCheck
 
 
 class Taken(NamedTuple):
@@ -113,6 +186,15 @@ class Told(NamedTuple):
 
 
 @kernel
+def with_robot(seen: PairSeen, rules: MountRules) -> PairSeen:
+    """What a frame shows, with the follower's own pose in the place of its body's.
+
+    The leader's stays its body's, which only the filter knows how to tell from the leader.
+    """
+    return seen._replace(follower=robot_pose(seen.follower, rules.follower))
+
+
+@kernel
 def by_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
     """Motion of the follower as odometry tells it, put right where that is known to be wrong."""
     return follower_motion(memory.history, known.odometry, capture_ns, rules.trust, known.correction)
@@ -129,18 +211,153 @@ def due_pose(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: 
 
 
 @kernel
+def by_pose(before: OdometrySample, after: OdometrySample) -> MotionSample:
+    """Mean motion from one pose of odometry to the next, in the middle between them."""
+    span_ns = after.stamp_ns - before.stamp_ns
+    if span_ns <= 0:
+        return MotionSample(after.stamp_ns, after.v2, after.u2)
+    way, dt = way_between(before.pose, after.pose), span_ns * _NS
+    return MotionSample(before.stamp_ns + span_ns // 2, way.v / dt, way.u / dt)
+
+
+@kernel
+def _trust(known: Known, rules: Rules) -> InputTrust:
+    """What is known of odometry, its delay as it is corrected."""
+    return rules.trust._replace(delay=rules.trust.delay + known.correction.delay)
+
+
+@kernel
+def _fresh_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
+    """Motion by odometry that is believed, as old as it is; by nothing at all if there is none to believe."""
+    motion, check = by_odometry(known, memory, rules, capture_ns), known.odometry_check
+    if source_of(check) == TRACK or not check.heard:
+        return motion._replace(sd_v2=rules.own_noise.v_max, sd_u2=rules.own_noise.u_max)
+    return aged(motion, check, age_of(check, capture_ns, _trust(known, rules)), rules.own_noise)
+
+
+@kernel
+def _is_fresh(known: Known, rules: Rules, capture_ns: int) -> bool:
+    """Whether odometry is believed and covers a capture."""
+    check = known.odometry_check
+    age = age_of(check, capture_ns, _trust(known, rules))
+    return check.heard and source_of(check) != TRACK and age <= fresh_for(check)
+
+
+@kernel
+def by_either(known: Known, memory: Memory, rules: Rules, due: OwnPoint) -> FollowerMotion:
+    """Motion at a pose that is due: by odometry while that is fresh, else by what is known better."""
+    motion = _fresh_odometry(known, memory, rules, due.capture_ns)
+    if _is_fresh(known, rules, due.capture_ns):
+        return motion
+    own = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
+    return own if is_better(own, motion, rules.own_noise) else motion
+
+
+@kernel
+def by_either_at(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
+    """The same at a point of the follower's own track, which may not have it."""
+    motion = _fresh_odometry(known, memory, rules, capture_ns)
+    if _is_fresh(known, rules, capture_ns):
+        return motion
+    at = own_place(memory.own, known.own, capture_ns)
+    if at == known.own.length:
+        return motion
+    point = own_point(memory.own, known.own, at)
+    own = motion_of(point)
+    return own if point.capture_ns == capture_ns and is_better(own, motion, rules.own_noise) else motion
+
+
+@kernel
+def _judged(known: Known, memory: Memory, rules: Rules) -> OdometryCheck:
+    """Odometry's check with what the follower's own track has to say."""
+    check = known.odometry_check
+    if not awaits_track(check):
+        return check
+    return with_own_track(check, memory.ways, memory.own, known.own, rules.own_noise, _trust(known, rules))
+
+
+@kernel
+def take_not_finite(known: Known, now_ns: int) -> Known:
+    """Take note of odometry that came with a number that is none."""
+    return known._replace(odometry_check=known.odometry_check._replace(bad_ns=now_ns))
+
+
+@kernel
 def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
-    """Take in a mocap frame that was captured at a time by the host's clock."""
+    """Take in a mocap frame that was captured at a time by the host's clock.
+
+    It is taken with the noise as known from the frames before, and keeps that if it is folded again.
+    """
+    learns = rules.noise_learning.learns
+    using = with_noise(rules, scaled_noise(rules.noise, known.noise)) if learns else rules
+    taken = _take_frame(known, memory, using, capture_ns, seen)
+    if taken.late or taken.verdict == DUPLICATE or taken.verdict == LATE:
+        return taken
+    after = taken.known
+    # An outlier of the follower may be one by a wrong mount.
+    if taken.cause == BELIEVED or taken.cause == LEADER_OFF or taken.cause == FOLLOWER_OFF:
+        jumped = taken.verdict == RESTARTED
+        check = mount_watched(after.mount_check, capture_ns, seen.follower, using.noise, jumped)
+        after = after._replace(mount_check=check)
+    if learns:
+        gated = taken.cause != BELIEVED
+        learned = noise_with_frame(known.noise, Moment(capture_ns, seen), gated, rules.noise_learning)
+        after = after._replace(noise=learned)
+        if is_another(learned):
+            after = _on_other_noise(after, memory, rules.filter)
+    return taken._replace(known=after)
+
+
+@kernel
+def _on_other_noise(known: Known, memory: Memory, estimator: Filter) -> Known:
+    """The same where the noise turns out to be another one than all rests on that was learned before.
+
+    How the leader drives was weighed against that, and of a larger noise the belief is less certain.
+    """
+    points, ring, noise = memory.points, known.track, known.noise
+    if ring.length > 0 and noise.scale.position > noise.basis:
+        by, point = noise.scale.position / noise.basis, newest(points, ring)
+        wider = estimator.widened(point.belief, by * by)
+        store(points, place(ring, points, ring.length - 1), point._replace(belief=wider))
+    for k in range(MEMBERS):
+        store(memory.bank, k, load(Member, memory.bank, k)._replace(score=0.0))
+    noise = noise._replace(basis=noise.scale.position)
+    return known._replace(noise=noise, process=restarted(known.process)._replace(speed=1.0, turn=1.0))
+
+
+@kernel
+def with_sight_noise(taken: Taken, memory: Memory, rules: Rules) -> Taken:
+    """The same with what a sighting that came in order tells of the sensor's noise."""
+    unused = taken.verdict == DUPLICATE or taken.verdict == LATE
+    if not rules.noise_learning.learns or taken.late or unused:
+        return taken
+    learned = noise_with_sighting(taken.known.noise, newest(memory.points, taken.known.track))
+    return taken._replace(known=taken.known._replace(noise=learned))
+
+
+@kernel
+def with_noise(rules: Rules, noise: PoseNoise) -> Rules:
+    """Rules by which poses have this noise."""
+    return rules._replace(noise=noise, own_noise=rules.own_noise._replace(pose=noise))
+
+
+@kernel
+def _take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
     if rules.source == ODOMETRY:
         motion = by_odometry(known, memory, rules, capture_ns)
         return take(known, memory, rules, measured(rules, capture_ns, seen, motion))
     due = due_pose(known, memory, rules, capture_ns, seen)
-    motion = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
-    if known.own.length > 0 and capture_ns < own_point(memory.own, known.own, 0).capture_ns:
-        motion = by_odometry(known, memory, rules, capture_ns)
+    if rules.source == AUTO:
+        motion = by_either(known, memory, rules, due)
+    else:
+        motion = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
+        if known.own.length > 0 and capture_ns < own_point(memory.own, known.own, 0).capture_ns:
+            motion = by_odometry(known, memory, rules, capture_ns)
     taken = take(known, memory, rules, measured(rules, capture_ns, seen, motion))
     # A follower's pose that is not believed must not move its own track either.
     believed = taken.cause == BELIEVED or taken.cause == LEADER_OFF
+    # Odometry that lies must not keep its judge from the poses that tell so: the track has a gate of its own.
+    believed = believed or (rules.source == AUTO and taken.cause == FOLLOWER_OFF)
     if taken.verdict == DUPLICATE or taken.verdict == LATE or not believed:
         return taken
     own = folded(memory.own, taken.known.own, due, rules.own_noise, rules.settings.window)
@@ -149,6 +366,9 @@ def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen
         first = place_of(memory.points, after.track, capture_ns)
         _with_own_motion(after, memory, rules, first)
         reprocessed(memory.points, after.track, first, rules.settings, rules.filter)
+    if rules.source == AUTO:
+        since_ns = after.watched_ns if after.watched_ns > 0 else capture_ns
+        after = after._replace(odometry_check=_judged(after, memory, rules), watched_ns=since_ns)
     return taken._replace(known=after)
 
 
@@ -158,7 +378,25 @@ def measured(rules: Rules, capture_ns: int, seen: PairSeen, motion: FollowerMoti
     leader = (seen.leader_x, seen.leader_y)
     if rules.filter.in_world:
         return measure_world(capture_ns, leader, seen.follower, rules.noise, motion)
+    if rules.source == MOCAP:
+        return measure_body_anchored(capture_ns, leader, seen.follower, rules.noise, motion)
     return measure_body_from_mocap(capture_ns, leader, seen.follower, rules.noise, motion)
+
+
+@kernel
+def _with_way(known: Known, memory: Memory, rules: Rules, measurement: Measurement, k: int) -> Measurement:
+    """Measurement, the track's k-th, with the way by odometry since the one before, where that counts."""
+    if rules.filter.in_world or measurement.anchored or k == 0 or known.odometry.length == 0:
+        return measurement
+    to_ns = measurement.capture_ns
+    by_sample = rules.source == ODOMETRY or not measurement.framed
+    if not by_sample and (rules.source != AUTO or not _is_fresh(known, rules, to_ns)):
+        return measurement._replace(has_way=False)
+    from_ns = capture_at(memory.points, known.track, k - 1)
+    if from_ns >= to_ns:
+        return measurement
+    way = motion_between(memory.history, known.odometry, (from_ns, to_ns), rules.trust, known.correction)
+    return measurement._replace(has_way=True, way=way)
 
 
 @kernel
@@ -166,18 +404,66 @@ def take(known: Known, memory: Memory, rules: Rules, measurement: Measurement) -
     """Take in a measurement of the leader."""
     points, ring = memory.points, known.track
     late = ring.length > 0 and measurement.capture_ns < capture_at(points, ring, ring.length - 1)
-    added = add(points, ring, measurement, rules.settings, rules.filter)
+    before = place_of(points, ring, measurement.capture_ns)
+    measurement = _with_way(known, memory, rules, measurement, before)
+    learning, estimator = rules.process_learning, rules.filter
+    if learning.on:
+        estimator = estimator.driven_by(learned_noise(known.process, learning))
+    added = add(points, ring, measurement, rules.settings, estimator)
     cause = added.cause if added.verdict == GATED else BELIEVED
-    return Taken(known._replace(track=added.ring), added.verdict, cause, late)
+    known = known._replace(track=added.ring)
+    if late and measurement.has_way and added.verdict != DUPLICATE and added.verdict != LATE:
+        _shorten_way(known, memory, rules, measurement.capture_ns)
+    if learning.on and not late:
+        known = known._replace(process=_learned(known, memory, rules, added.verdict))
+    if rules.filter.in_world and not late:
+        point, settings = newest(points, added.ring), rules.settings
+        known = known._replace(travel=watched(known.travel, point, settings.lost_after, rules.filter.limits))
+    return Taken(known, added.verdict, cause, late)
 
 
 @kernel
-def take_odometry(known: Known, memory: Memory, rules: Rules, sample: MotionSample) -> Known:
+def _shorten_way(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> None:
+    """Give what comes after a measurement that came late its way since that one."""
+    points, ring = memory.points, known.track
+    k = place_of(points, ring, capture_ns) + 1
+    after = _with_way(known, memory, rules, point_at(points, ring, k).measurement, k)
+    if _put_measurement(known, memory, k, after):
+        reprocessed(points, ring, k, rules.settings, rules.filter)
+
+
+@kernel
+def _learned(known: Known, memory: Memory, rules: Rules, verdict: int) -> LearnedProcess:
+    """What is known of the leader's driving with the newest point of its track in it."""
+    if verdict == RESTARTED:
+        return restarted(known.process)
+    if verdict != USED:
+        return known.process
+    point = newest(memory.points, known.track)
+    return learn(known.process, memory.bank, point, rules.process_learning, rules.filter)
+
+
+@kernel
+def take_odometry(known: Known, memory: Memory, rules: Rules, told: OdometrySample) -> Known:
     """Take in a sample of odometry, and fold again what came after the sample before it."""
+    sample = MotionSample(told.stamp_ns, told.v2, told.u2)
+    if rules.source == AUTO:
+        check = known.odometry_check
+        if source_of(check) == POSE and told.has_pose and check.last.has_pose:
+            sample = by_pose(check.last, told)
+        by = known.correction
+        told = told._replace(v2=by.scale_v * told.v2, u2=by.scale_u * told.u2)
+        check = with_sample(check, memory.ways, told, rules.own_noise)
+        known = known._replace(odometry_check=check)
+        if known.own.length > 0:
+            seen = rules
+            if rules.noise_learning.learns:
+                seen = with_noise(rules, scaled_noise(rules.noise, known.noise))
+            known = known._replace(odometry_check=_judged(known, memory, seen))
     ring = remember(memory.history, known.odometry, sample, rules.span)
     known = known._replace(odometry=ring)
     n = known.track.length
-    if not rules.reprocesses or n == 0:
+    if not rules.reprocesses or n == 0 or source_of(known.odometry_check) == TRACK:
         return known
     k, since_ns = sample_place(memory.history, ring, sample.stamp_ns), 0
     if k > 0:
@@ -202,8 +488,14 @@ def _with_odometry(known: Known, memory: Memory, rules: Rules, first: int) -> bo
     changed = False
     for k in range(first, known.track.length):
         point = point_at(memory.points, known.track, k)
-        motion = by_odometry(known, memory, rules, point.measurement.capture_ns)
-        changed = _put_motion(known, memory, k, point, motion) or changed
+        capture_ns = point.measurement.capture_ns
+        if rules.source == AUTO:
+            motion = by_either_at(known, memory, rules, capture_ns)
+        else:
+            motion = by_odometry(known, memory, rules, capture_ns)
+        measurement = with_motion(point, motion).measurement
+        measurement = _with_way(known, memory, rules, measurement, k)
+        changed = _put_measurement(known, memory, k, measurement) or changed
     return changed
 
 
@@ -217,23 +509,34 @@ def _with_own_motion(known: Known, memory: Memory, rules: Rules, first: int) -> 
         at = own_place(memory.own, known.own, capture_ns)
         if at < known.own.length:
             own = own_point(memory.own, known.own, at)
-            if own.capture_ns == capture_ns:
+            if own.capture_ns == capture_ns and rules.source == AUTO:
+                motion = by_either_at(known, memory, rules, capture_ns)
+                changed = _put_motion(known, memory, k, point, motion) or changed
+            elif own.capture_ns == capture_ns:
                 changed = _put_motion(known, memory, k, point, motion_of(own)) or changed
     return changed
 
 
 @kernel
 def _put_motion(known: Known, memory: Memory, k: int, point: TrackPoint, motion: FollowerMotion) -> bool:
-    was = point.measurement.motion
-    same = (
-        was.v2 == motion.v2
-        and was.u2 == motion.u2
-        and was.sd_v2 == motion.sd_v2
-        and was.sd_u2 == motion.sd_u2
-    )
+    return _put_measurement(known, memory, k, with_motion(point, motion).measurement)
+
+
+@kernel
+def _put_measurement(known: Known, memory: Memory, k: int, measurement: Measurement) -> bool:
+    """Put another motion and way of the follower in at a point; whether they are other ones."""
+    point = point_at(memory.points, known.track, k)
+    was = point.measurement
+    same = _same_motion(was.motion, measurement.motion) and _same_motion(was.way, measurement.way)
+    same = same and was.has_way == measurement.has_way
     if not same:
-        store(memory.points, place(known.track, memory.points, k), with_motion(point, motion))
+        store(memory.points, place(known.track, memory.points, k), point._replace(measurement=measurement))
     return not same
+
+
+@kernel
+def _same_motion(a: FollowerMotion, b: FollowerMotion) -> bool:
+    return a.v2 == b.v2 and a.u2 == b.u2 and a.sd_v2 == b.sd_v2 and a.sd_u2 == b.sd_u2
 
 
 @kernel
@@ -249,7 +552,21 @@ def _own_again(known: Known, memory: Memory, rules: Rules, since_ns: int) -> Non
 
 
 @kernel
+def is_under_way(known: Known, rules: Rules) -> bool:
+    """Whether there is all that estimates rest on: the leader's track, and motion of the follower."""
+    if known.track.length == 0:
+        return False
+    if rules.source == MOCAP:
+        return known.own.length > 0
+    return known.odometry.length > 0 or (rules.source == AUTO and known.own.length > 0)
+
+
+@kernel
 def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) -> Told:
     """Newest estimate of a track that has one, its status as seen at ``now_ns``."""
     point = newest(points, known.track)
-    return Told(estimate_at(point, status_of(point, now_ns, rules.settings)), point.cause)
+    point = point._replace(belief=rules.filter.leader(point.belief, point.measurement))
+    status, cause = status_of(point, now_ns, rules.settings), point.cause
+    if status == TRACKING and rules.mounts.stops and is_off(known.mount_check):
+        status, cause = REJECTING, MOUNT
+    return Told(guessed_when_slow(estimate_at(point, status), rules.filter.limits.v_eps), cause)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
+from typing import NamedTuple
 
 from estimation.tracking.prediction import LARGEST
 from estimation.tracking.turn_prediction import TurnPrediction, TurnTrend
@@ -23,6 +24,13 @@ class TurnSource(IntEnum):
     PREDICTED = 2
     FADED = 3
     OWN = 4
+
+
+class TurnSpread(NamedTuple):
+    """Variance of an estimated u1 [rad^2/s^2], and its covariance with alpha1 [rad^2/s]."""
+
+    u1: float
+    with_alpha1: float
 
 
 SOURCES = {
@@ -47,16 +55,18 @@ def trend_with(
     before: TurnTrend,
     capture_ns: int,
     u1: float,
-    variance: float,
+    spread: TurnSpread,
     ahead: float,
 ) -> TurnTrend:
     """Trend with an estimate in it; one that no sound estimator gives ends it, not to stay in it.
 
     ``ahead`` [s] is from the estimate's capture to when a command acts.
     """
+    variance = spread.u1
     if abs(u1) < LARGEST and 0.0 <= variance < LARGEST:
-        return turn_prediction.heard(before, capture_ns, u1, variance, ahead)
-    return TurnTrend(False, 0, 0.0, 0.0, 0.0)
+        seen = turn_prediction.seen_in(variance, spread.with_alpha1)
+        return seen.heard(before, capture_ns, u1, variance, ahead)
+    return TurnTrend(False, 0, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -68,7 +78,7 @@ def turned_further(source: int, turn_prediction: TurnPrediction, trend: TurnTren
     """
     if source == _PREDICTED or not trend.known:
         return 0.0
-    return turn_prediction.further(trend, ahead)
+    return turn_prediction.of_trend(trend).further(trend, ahead)
 
 
 @kernel
@@ -82,5 +92,5 @@ def turn_when_acting(
         return math.nan
     u1 = turn_prediction.predicted(trend)
     if source == _FADED:
-        return u1 * turn_prediction.weight(trend.variance, ahead)
+        return u1 * turn_prediction.of_trend(trend).weight(trend.variance, ahead)
     return u1

@@ -19,10 +19,11 @@ def _numbered(*words: str) -> int:
 
 NOT_REFUSED = message_checks.ACCEPTED
 UNKNOWN_BODY, BAD_STAMP = message_checks.UNKNOWN_BODY, message_checks.BAD_STAMP
-BAD_RANGE = message_checks.BAD_RANGE
+BAD_RANGE, NOT_FINITE = message_checks.BAD_RANGE, message_checks.NOT_FINITE
 CLOCK_UNKNOWN, CLOCK_JUMP = _numbered("clock_unknown"), _numbered("clock_jump")
 SAME_PLACE = _numbered("same_place")
 NO_BODY_FRONT_END = _numbered("sighting_without_body_front_end")
+ODOMETRY_NOT_FINITE = _numbered("odometry_not_finite")
 _BY_VERDICT = _numbered(*(verdict.word for verdict in sorted(Verdict)))
 _BY_FOLLOWER = _numbered(*(cause.word for cause in sorted(FollowerCause)))
 REFUSALS = tuple(_WORDS)

@@ -19,6 +19,7 @@ REJECTIONS = {
     Cause.FLIPPED: "follower's heading turned round",
     Cause.SWAPPED: "leader and follower have changed places",
     Cause.FROZEN: "last pose of a moving body repeated",
+    Cause.MOUNT: "follower's heading is not its direction of travel: calibrate its mount",
 }
 
 

@@ -1,8 +1,9 @@
 """Column maps: what the columns of a CSV recording mean.
 
 A map is a TOML file. ``[columns]`` says where the measurement comes from: ``t``, then either ``rho`` and
-``alpha2`` or both poses, and the follower's motion ``v2``, ``u2``. ``[truth]`` says what is known of the true
-states. ``[scenario]`` has a ``base`` (name or path) and what differs from it: front end, noise, limits.
+``alpha2`` or both poses, and the follower's motion ``v2``, ``u2``, which its poses may tell instead.
+``[truth]`` says what is known of the true states. ``[scenario]`` has a ``base`` (name or path) and what
+differs from it: front end, noise, limits.
 An entry is a column's name, or ``{ column, scale, offset }``, or ``{ constant }``.
 """
 
@@ -17,7 +18,7 @@ import msgspec
 from msgspec import Struct
 
 from hil.errors import UsageError
-from hil.replay.topic_map import MAPS
+from hil.replay.topic_map import MAPS, needs_odometry
 from hil.scenario.checked_toml import checked, locate, read_toml
 from hil.scenario.files import merged_scenario
 from hil.scenario.schema import Scenario
@@ -39,8 +40,8 @@ class Columns(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What the estimator gets. Time [s], distances [m], angles [rad], speed [m/s], turn rate [rad/s]."""
 
     t: Entry
-    v2: Entry
-    u2: Entry
+    v2: Entry | None = None
+    u2: Entry | None = None
     rho: Entry | None = None
     alpha2: Entry | None = None
     leader_x: Entry | None = None
@@ -90,6 +91,11 @@ class ColumnMap:
     scenario: Scenario
 
     @property
+    def moved(self) -> bool:
+        """Whether the follower's motion is measured by itself."""
+        return "v2" in self.columns
+
+    @property
     def sighted(self) -> bool:
         """Whether the leader is measured by range and bearing, not by poses of both."""
         return "rho" in self.columns
@@ -120,6 +126,7 @@ def load_column_map(name_or_path: str) -> ColumnMap:
         scenario=merged_scenario(file.scenario, path.stem, f"{source}: scenario"),
     )
     _check_measurement(chart, source)
+    _check_motion(chart, source)
     return chart
 
 
@@ -154,4 +161,17 @@ def _check_measurement(chart: ColumnMap, source: str) -> None:
     if has_sighting and chart.scenario.estimator.front_end != "body":
         raise UsageError(
             f"{source}: range and bearing need the body front end; set scenario.estimator.front_end = 'body'"
+        )
+
+
+def _check_motion(chart: ColumnMap, source: str) -> None:
+    missing = sorted({"v2", "u2"} - set(chart.columns))
+    if len(missing) == 1:
+        raise UsageError(
+            f"{source}: columns: {missing[0]} missing; name a column or a constant for it, or leave out both"
+        )
+    if missing and (chart.sighted or needs_odometry(chart.scenario)):
+        raise UsageError(
+            f"{source}: columns: u2, v2 missing; name columns or constants for them, or give both poses "
+            "and set scenario.estimator.own_motion = 'auto' or 'mocap'"
         )

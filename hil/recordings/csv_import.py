@@ -12,7 +12,7 @@ from hil.emulator.lab_messages import frame_message, odometry_message
 from hil.log.described_log import DescribedLog
 from hil.log.metadata import IMPORT, certificate_metadata, log_metadata
 from hil.recordings.column_map import ColumnMap
-from hil.recordings.csv_table import Row, read_rows
+from hil.recordings.csv_table import Row, read_table
 from hil.scenario.certificate import certificate_json, certificate_of
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -22,12 +22,16 @@ from hil.wire.topics import Topics, topics_of
 
 @dataclass(frozen=True, slots=True)
 class Imported:
-    """What an import gave: rows read, messages written, and the times [s] of the first and the last row."""
+    """What an import gave: rows read, messages written, and the times [s] of the first and the last row.
+
+    ``torn``: number of a last line that was left out because the file ends in it, 0 for none.
+    """
 
     rows: int
     messages: int
     from_s: float
     to_s: float
+    torn: int = 0
 
 
 def import_csv(recording: Path, chart: ColumnMap, out: Path) -> Imported:
@@ -36,7 +40,7 @@ def import_csv(recording: Path, chart: ColumnMap, out: Path) -> Imported:
     Raises :class:`UsageError` as :func:`hil.recordings.csv_table.read_rows`, before anything is written, and
     if ``out`` exists or cannot be created. No half log is left behind.
     """
-    rows = read_rows(recording, chart)
+    rows, torn = read_table(recording, chart)
     names = topics_of(chart.scenario)
     metadata = log_metadata(chart.scenario, IMPORT) | certificate_metadata(
         certificate_json(certificate_of(chart.scenario, driven=False))
@@ -50,15 +54,20 @@ def import_csv(recording: Path, chart: ColumnMap, out: Path) -> Imported:
         except BaseException:
             out.unlink(missing_ok=True)
             raise
-    return Imported(len(rows), log.messages, rows[0].t_ns * 1e-9, rows[-1].t_ns * 1e-9)
+    return Imported(len(rows), log.messages, rows[0].t_ns * 1e-9, rows[-1].t_ns * 1e-9, torn)
 
 
 def _messages(number: int, row: Row, chart: ColumnMap, names: Topics) -> Iterator[tuple[str, msg.Message]]:
     """Messages of a row, in the order in which the robot had them."""
-    measurement = _sighting(row, names) if chart.sighted else _frame(number, row, names)
-    motion = (names.odom, _odometry(row, names))
-    yield from (measurement, motion) if chart.commanded else (motion, measurement)
-    if chart.truth:
+    given = row.columns
+    measurement: list[tuple[str, msg.Message]] = []
+    if "rho" in given:
+        measurement = [_sighting(row, names)]
+    elif "leader_x" in given or "follower_x" in given:
+        measurement = [_frame(number, row, names)]
+    motion = [(names.odom, _odometry(row, names))] if "v2" in given else []
+    yield from [*measurement, *motion] if chart.commanded else [*motion, *measurement]
+    if row.truth:
         yield topics.TRUTH, _truth(number, row)
 
 
@@ -69,9 +78,13 @@ def _sighting(row: Row, names: Topics) -> tuple[str, msg.Message]:
 
 def _frame(number: int, row: Row, names: Topics) -> tuple[str, msg.Message]:
     given = row.columns
-    leader = Pose(given["leader_x"], given["leader_y"], given.get("leader_theta", 0.0))
-    follower = Pose(given["follower_x"], given["follower_y"], given["follower_theta"])
-    bodies = ((names.leader, leader), (names.follower, follower))
+    bodies: list[tuple[str, Pose]] = []
+    if "leader_x" in given:
+        leader = Pose(given["leader_x"], given["leader_y"], given.get("leader_theta", 0.0))
+        bodies.append((names.leader, leader))
+    if "follower_x" in given:
+        follower = Pose(given["follower_x"], given["follower_y"], given["follower_theta"])
+        bodies.append((names.follower, follower))
     return topics.RIGID_BODIES, frame_message(row.t_ns, number, bodies)
 
 

@@ -31,7 +31,8 @@ class Pair:
     """Tracks of leader and follower (columns x [m], y [m], theta [rad]) and the follower's odometry.
 
     Odometry has the columns v [m/s] and u [rad/s]; in these data sets it is what the robot was *told* to
-    drive. Robots are named by ``leader``, ``follower``: robot1, robot2, ...
+    drive. Sightings, where they are wanted, are what the follower's camera saw of the leader: range [m] and
+    bearing [rad]. Robots are named by ``leader``, ``follower``: robot1, robot2, ...
     """
 
     leader: str
@@ -39,9 +40,10 @@ class Pair:
     leader_track: Series
     follower_track: Series
     odometry: Series
+    sightings: Series | None = None
 
 
-def read_pair(folder: Path, leader: int, follower: int) -> Pair:
+def read_pair(folder: Path, leader: int, follower: int, *, sighted: bool = False) -> Pair:
     """Read what there is of two robots.
 
     Raises :class:`UsageError` for a folder without such files, a robot that it does not have, the same robot
@@ -64,7 +66,8 @@ def read_pair(folder: Path, leader: int, follower: int) -> Pair:
             f"folder {folder}: the tracks of robots {leader} and {follower} have no time in common "
             f"({_span(leads)} and {_span(follows)}); use files of one recording"
         )
-    return Pair(f"robot{leader}", f"robot{follower}", leads, follows, odometry)
+    seen = _sightings(folder, leader, follower) if sighted else None
+    return Pair(f"robot{leader}", f"robot{follower}", leads, follows, odometry, seen)
 
 
 def read_series(path: Path, columns: int) -> Series:
@@ -91,6 +94,39 @@ def read_series(path: Path, columns: int) -> Series:
     if not stamps:
         raise UsageError(f"{path}: has no rows; expected a time and {columns} numbers in each")
     return Series(np.array(stamps, dtype=np.int64), np.array(rows, dtype=np.float64))
+
+
+def _sightings(folder: Path, leader: int, follower: int) -> Series:
+    """What the follower's camera saw of the leader, by the bar code that the leader bears.
+
+    Rows of one stamp are of several subjects, so that the file is read whole and then sifted.
+    """
+    codes = {subject: round(code) for subject, code in _numbers(folder / "Barcodes.dat", 2)}
+    if leader not in codes:
+        raise UsageError(
+            f"{folder / 'Barcodes.dat'}: has no subject {leader}; expected a bar code of robot {leader}"
+        )
+    path = folder / f"Robot{follower}_Measurement.dat"
+    rows = [row for row in _numbers(path, 4) if round(row[1]) == codes[leader]]
+    stamps: dict[int, list[float]] = {
+        round(time * 1_000_000_000): [float(distance), float(bearing)] for time, _, distance, bearing in rows
+    }
+    if not stamps:
+        raise UsageError(
+            f"{path}: robot {follower} never saw robot {leader} (bar code {codes[leader]}); take another pair"
+        )
+    in_order = sorted(stamps)
+    return Series(np.array(in_order, dtype=np.int64), np.array([stamps[at] for at in in_order]))
+
+
+def _numbers(path: Path, columns: int) -> list[list[Decimal]]:
+    """Rows of so many finite numbers."""
+    rows: list[list[Decimal]] = []
+    for line, cells in _lines(path):
+        if len(cells) != columns:
+            raise UsageError(f"{path}: line {line} has {len(cells)} numbers, expected {columns}")
+        rows.append([_number(path, line, cell) for cell in cells])
+    return rows
 
 
 def _robots(folder: Path) -> list[int]:

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from estimation.calibration.sensor_bias import SensorBias, TooFewSightingsError, find_sensor_bias
 from estimation.calibration.smoothed_track import poses_at
 from formation.angles import FloatArray
+from formation.mount import Mount, robot_pose
 from hil.errors import UsageError
 from hil.log.events import logged_events
 from hil.log.metadata import IMPORT, mode_of
 from hil.log.reader import Log
+from hil.scenario.leader_model import follower_mount
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.message_types import Truth
@@ -48,13 +50,14 @@ def calibrate(
     sightings: dict[int, Sighting] = {}
     poses: Poses = {}
     late_ns = round(scenario.estimator.stamp_offset_s * 1e9)
+    mount = follower_mount(scenario)
     for event, now_ns in logged_events(log, [source, names.sighting]):
         try:
             if event.topic == names.sighting:
                 sighting = read_sighting(event.payload, now_ns)
                 sightings[sighting.capture_ns] = sighting
             else:
-                poses |= _poses(event.topic, event.payload, names, now_ns, late_ns)
+                poses |= _poses(event.topic, event.payload, names, now_ns, late_ns, mount)
         except (RefusedError, MalformedPayloadError):
             continue
     if len(poses) < 2:
@@ -78,10 +81,10 @@ def calibrate(
         raise UsageError(f"log {log.path}: {error}; give a longer span") from None
 
 
-def _poses(topic: str, payload: bytes, names: Topics, now_ns: int, late_ns: int) -> Poses:
+def _poses(topic: str, payload: bytes, names: Topics, now_ns: int, late_ns: int, mount: Mount) -> Poses:
     if topic == topics.RIGID_BODIES:
         frame = read_frame(payload, names.leader, names.follower, now_ns)
-        own = frame.follower
+        own = robot_pose(frame.follower, mount)
         return {frame.capture_ns - late_ns: (*frame.leader, own.x, own.y, own.theta)}
     truth = decode_as(payload, Truth)
     positions = (truth.leader_x, truth.leader_y, truth.follower_x, truth.follower_y, truth.follower_theta)

@@ -14,6 +14,7 @@ from hil.errors import AbreastError
 from hil.log.reader import Log
 from hil.nodes.controller import ControllerNode, ControllerState
 from hil.nodes.estimator import EstimatorNode, EstimatorState
+from hil.nodes.findings import Findings, all_found
 from hil.replay.kept import Array, Kept, KeptReplay
 from hil.replay.pair_desk import NEVER, Repeats, Roles
 from hil.replay.pair_rows import MOST_LOST, Capacity, Nodes, PairRows
@@ -77,6 +78,7 @@ class FollowerReplay:
         self.wrong: dict[str, list[int]] = {part.node: [] for part in (ESTIMATES, DECIDES)}
         self._gap_s = {part.node: 0.0 for part in (ESTIMATES, DECIDES)}
         self.rows = PairRows(self.nodes, self._roles(numbers), self._capacity(log), room)
+        self._found: dict[str, dict[str, str]] = {}
 
     def _roles(self, numbers: Mapping[str, int]) -> Roles:
         names, heard = self.names, self.nodes.controller.subscribes
@@ -193,10 +195,24 @@ class FollowerReplay:
         if len(wrong) == 1 and done.outputs > 1:
             self._gap_s[part.node] = (done.computed_ns - done.before_ns) * 1e-9
 
+    def look(self) -> None:
+        """Note what the nodes find to be wrong by now."""
+        nodes = self.nodes
+        estimated, decided = (
+            load(Repeats, each, 0).computed_ns for each in (self.rows.estimating, self.rows.deciding)
+        )
+        now = {nodes.estimator.name: nodes.estimator.findings(nodes.estimating, estimated)}
+        if self._decides:
+            now[nodes.controller.name] = nodes.controller.findings(nodes.deciding, decided)
+        self._found = all_found([self._found, now])
+
     def result(
-        self, sides: Sequence[tuple[int, bytes]], reports: Mapping[str, Mapping[str, str]]
+        self,
+        sides: Sequence[tuple[int, bytes]],
+        reports: Mapping[str, Mapping[str, str]],
+        found: Mapping[str, Findings],
     ) -> KeptReplay:
-        """What was kept of it, with orders to change sides and the nodes' last reports."""
+        """What was kept of it, orders to change sides, and what nodes reported and found."""
         rows, tally = self.rows, self.rows.tally()
         estimating, deciding = load(Repeats, rows.estimating, 0), load(Repeats, rows.deciding, 0)
         arrivals = rows.kept("arrivals", tally.arrivals)
@@ -210,10 +226,19 @@ class FollowerReplay:
             sides=sides,
             reports=reports,
             stopped_ns=None if tally.stopped_ns == NEVER else tally.stopped_ns,
+            found=found,
         )
         state = self.nodes.estimating
         if not self.same:
-            return KeptReplay(self.link, kept, state.taken, state.refused, {}, estimating.missing)
+            return KeptReplay(
+                self.link,
+                kept,
+                state.taken,
+                state.refused,
+                missing_inputs=estimating.missing,
+                noise_scale=state.noise_scale,
+                found=self._found,
+            )
         return KeptReplay(
             self.link,
             kept,
@@ -225,6 +250,8 @@ class FollowerReplay:
             },
             missing_inputs=estimating.missing + deciding.missing,
             restarts=self.restarts,
+            noise_scale=state.noise_scale,
+            found=self._found,
         )
 
     def _parity(self, part: Part, compared: int, also: set[int], unrecorded: int) -> Parity:

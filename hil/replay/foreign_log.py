@@ -3,29 +3,34 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Iterator
+import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__PointStamped as PointStamped
 from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__PoseStamped as PoseStamped
 
 from hil.errors import UsageError
 from hil.log.events import Timed
 from hil.log.reader import Log, Record
-from hil.replay.topic_map import TopicMap
+from hil.replay.topic_map import TopicMap, needs_odometry
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.events import Event
-from hil.wire.messages import MalformedPayloadError, decode_as, encode, header, to_ns, typename_of
+from hil.wire.messages import MalformedPayloadError, decode, decode_as, encode, header, to_ns, typename_of
 from hil.wire.topics import topics_of
 
 _OTHER_CLOCK_NS = 1_000_000_000
 _FRAMES = (typename_of(msg.RigidBodies), "mocap_msgs/msg/RigidBodies")
 _POSES = (typename_of(PoseStamped), typename_of(msg.Odometry))
 _MOTIONS = (typename_of(msg.Odometry), typename_of(msg.TwistStamped))
+_SIGHTINGS = (typename_of(msg.RangeBearing), typename_of(PoseStamped), typename_of(PointStamped))
+_STAMPED = (PoseStamped, PointStamped, msg.Odometry, msg.TwistStamped, msg.RangeBearing)
 _UNKNOWN_COVARIANCE = np.zeros(36)
-_ORIGIN = msg.Pose(
-    position=msg.Point(x=0.0, y=0.0, z=0.0), orientation=msg.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
+# A quaternion of zeros stands for none.
+_NO_POSE = msg.Pose(
+    position=msg.Point(x=0.0, y=0.0, z=0.0), orientation=msg.Quaternion(x=0.0, y=0.0, z=0.0, w=0.0)
 )
 
 
@@ -53,8 +58,13 @@ def foreign_events(log: Log, chart: TopicMap) -> list[Timed]:
     are shifted so that the freshest input has no age. Raises :class:`UsageError` if the log lacks a topic or
     a body of the map, if a topic is of a type that cannot be used, or if no two poses make up a frame.
     """
-    frames = _frames(log, chart) if chart.topics.rigid_bodies else _paired_frames(log, chart)
-    inputs = sorted([*frames, *_motions(log, chart)], key=lambda each: each.log_ns)
+    frames: list[_Input] = []
+    if chart.topics.rigid_bodies is not None:
+        frames = _frames(log, chart)
+    elif chart.topics.leader_pose is not None:
+        frames = _paired_frames(log, chart)
+    inputs = [*frames, *_sightings(log, chart), *_motions(log, chart)]
+    inputs.sort(key=lambda each: each.log_ns)
     age_ns = min(each.log_ns - each.stamp_ns for each in inputs)
     shift_ns = 0 if 0 <= age_ns <= _OTHER_CLOCK_NS else age_ns
     return [(Event(each.topic, encode(each.message)), each.log_ns - shift_ns) for each in inputs]
@@ -131,7 +141,7 @@ def _pair(leader: _SeenPose, follower: _SeenPose, number: int, chart: TopicMap) 
 def _poses(log: Log, chart: TopicMap, name: str) -> list[_SeenPose]:
     topic = _present(log, chart, name, _POSES)
     poses: list[_SeenPose] = []
-    for record, message in _messages(log, topic):
+    for record, message in _messages(log, topic, chart):
         if isinstance(message, PoseStamped):
             poses.append(_SeenPose(message.pose, _stamp_ns(record, message.header, chart), record.log_ns))
         elif isinstance(message, msg.Odometry):
@@ -143,13 +153,16 @@ def _poses(log: Log, chart: TopicMap, name: str) -> list[_SeenPose]:
 
 
 def _motions(log: Log, chart: TopicMap) -> list[_Input]:
-    topic = _present(log, chart, chart.topics.odometry, _MOTIONS)
-    own = topics_of(chart.scenario)
+    name, own = chart.topics.odometry, topics_of(chart.scenario)
+    if name is None or (name not in _bare(log.topics) and not _is_missed(log, chart)):
+        return []
+    topic = _present(log, chart, name, _MOTIONS)
     motions: list[_Input] = []
-    for record, message in _messages(log, topic):
+    for record, message in _messages(log, topic, chart):
         if isinstance(message, msg.Odometry):
-            twist = message.twist
+            pose, twist = message.pose.pose, message.twist
         elif isinstance(message, msg.TwistStamped):
+            pose = _NO_POSE
             twist = msg.TwistWithCovariance(twist=message.twist, covariance=_UNKNOWN_COVARIANCE)
         else:
             continue
@@ -157,7 +170,7 @@ def _motions(log: Log, chart: TopicMap) -> list[_Input]:
         odometry = msg.Odometry(
             header=header(stamp_ns, f"{own.follower}/odom"),
             child_frame_id=f"{own.follower}/base_footprint",
-            pose=msg.PoseWithCovariance(pose=_ORIGIN, covariance=_UNKNOWN_COVARIANCE),
+            pose=msg.PoseWithCovariance(pose=pose, covariance=_UNKNOWN_COVARIANCE),
             twist=twist,
         )
         motions.append(_Input(own.odom, odometry, stamp_ns, record.log_ns))
@@ -166,12 +179,44 @@ def _motions(log: Log, chart: TopicMap) -> list[_Input]:
     return motions
 
 
-def _messages(log: Log, topic: str) -> Iterator[tuple[Record, msg.Message]]:
+def _is_missed(log: Log, chart: TopicMap) -> bool:
+    """Whether odometry that the log does not have is needed, or seems to be there under another name."""
+    poses = {chart.topics.leader_pose, chart.topics.follower_pose}
+    others = {name for name, typename in log.topics.items() if typename in _MOTIONS}
+    misnamed = chart.scenario.estimator.own_motion == "auto" and _bare(others) - poses
+    return needs_odometry(chart.scenario) or bool(misnamed)
+
+
+def _sightings(log: Log, chart: TopicMap) -> list[_Input]:
+    """The leader as the follower saw it, by range and bearing out of whatever tells its place."""
+    name, own = chart.topics.sighting, topics_of(chart.scenario)
+    if name is None:
+        return []
+    topic = _present(log, chart, name, _SIGHTINGS)
+    sightings: list[_Input] = []
+    for record, message in _messages(log, topic, chart):
+        if isinstance(message, msg.RangeBearing):
+            rho, alpha2 = message.rho, message.alpha2
+        elif isinstance(message, PoseStamped | PointStamped):
+            at = message.point if isinstance(message, PointStamped) else message.pose.position
+            rho, alpha2 = math.hypot(at.x, at.y), math.atan2(at.y, at.x)
+        else:
+            continue
+        stamp_ns = _stamp_ns(record, message.header, chart)
+        seen = msg.RangeBearing(header(stamp_ns, own.follower), rho, alpha2)
+        sightings.append(_Input(own.sighting, seen, stamp_ns, record.log_ns))
+    if not sightings:
+        raise UsageError(f"log {log.path}: topic {topic!r} has no sighting that can be read; correct the map")
+    return sightings
+
+
+def _messages(log: Log, topic: str, chart: TopicMap) -> Iterator[tuple[Record, msg.Message]]:
     """Messages of a topic that can be decoded and have a stamp that is one."""
     for record in log.records([topic]):
         try:
-            message = log.decode(record)
-            if isinstance(message, PoseStamped | msg.Odometry | msg.TwistStamped):
+            told = chart.topics.types.get(topic.removeprefix("/"))
+            message = decode(record.payload, told) if told else log.decode(record)
+            if isinstance(message, _STAMPED):
                 to_ns(message.header.stamp)
                 yield record, message
         except MalformedPayloadError:
@@ -182,11 +227,16 @@ def _stamp_ns(record: Record, given: msg.Header, chart: TopicMap) -> int:
     return record.log_ns if chart.topics.stamps == "log" else to_ns(given.stamp)
 
 
+def _bare(names: Iterable[str]) -> set[str]:
+    return {name.removeprefix("/") for name in names}
+
+
 def _present(log: Log, chart: TopicMap, name: str, accepted: tuple[str, ...]) -> str:
     """Name of a topic of the map as the log has it."""
     for topic, typename in log.topics.items():
         if topic.removeprefix("/") != name:
             continue
+        typename = chart.topics.types.get(name, typename)
         if typename not in accepted:
             raise UsageError(
                 f"log {log.path}: topic {topic!r} is {typename}, expected {' or '.join(accepted)}; "

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from hil.nodes.findings import Findings
 from hil.nodes.node import Counts
 from hil.replay.re_execution import Parity
 from hil.scenario.links import Link
@@ -23,7 +24,8 @@ class Kept:
     ``estimates``, ``commands``: as they came out of the replay, rows of :mod:`hil.replay.kept_rows`, and so
     are ``truths``, ``poses`` and ``motions``. ``arrivals``: frames that the estimator took in. ``sides``: log
     time and payload of orders to change them. ``reports``: the last values of every node by its name.
-    ``stopped_ns``: when the first stop was logged.
+    ``found``: what nodes reported to be wrong at any time, likewise. ``stopped_ns``: when the first stop was
+    logged.
     """
 
     estimates: Array
@@ -35,13 +37,16 @@ class Kept:
     sides: Sequence[tuple[int, bytes]]
     reports: Mapping[str, Mapping[str, str]]
     stopped_ns: int | None
+    found: Mapping[str, Findings] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeptReplay:
     """A replay of one follower, as :class:`hil.replay.rerun.Replay` is, with rows in the place of messages.
 
-    ``taken``, ``refused``: the estimator's counts. ``fed`` is empty, since who is fed is replayed otherwise.
+    ``taken``, ``refused``, ``noise_scale``: the estimator's counts, and the noise that it found. ``found``:
+    findings of the nodes that were replayed, by their names, as seen now and then. ``fed`` is empty, since
+    who is fed is replayed otherwise.
     """
 
     link: Link
@@ -52,6 +57,8 @@ class KeptReplay:
     missing_inputs: int = 0
     restarts: Mapping[str, int] = field(default_factory=dict)
     fed: str = ""
+    noise_scale: float | None = None
+    found: Mapping[str, Findings] = field(default_factory=dict)
 
     @property
     def scenario(self) -> Scenario:

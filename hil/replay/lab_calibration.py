@@ -13,7 +13,12 @@ from hil.log.metadata import scenario_of
 from hil.log.reader import Log
 from hil.log.report_json import known
 from hil.replay.calibration import calibrate
+from hil.replay.foreign_log import foreign_events
+from hil.replay.mount_calibration import Mounts, mounts_of_events, mounts_of_log
+from hil.replay.noise_calibration import noise_of_log
 from hil.replay.timing import VAGUE, Timing, timing_of
+from hil.replay.topic_map import TopicMap
+from hil.scenario.files import with_overrides
 from hil.scenario.links import link_of, refuse_chain
 from hil.scenario.schema import Scenario
 from hil.wire.topics import topics_of
@@ -28,6 +33,8 @@ class Calibration:
     something of it is not known, a line each. ``uncertain``: that the correction is too uncertain to be set.
     ``settings``: scenario keys that put it right. ``offsets``: of a range and bearing sensor, ``range`` [m]
     and ``bearing`` [rad], each with ``offset``, ``sd`` and ``spread``; None without sightings.
+    ``mounts``: where the bodies of leader and follower sit on their robots. ``noise``: standard deviations of
+    measurements by the estimator's keys for them.
 
     >>> import abreast
     >>> scenario = abreast.load_scenario("turtlebot3", {"run.duration_s": 12.0})
@@ -42,6 +49,8 @@ class Calibration:
     uncertain: bool
     settings: Mapping[str, float]
     offsets: SensorBias | None
+    mounts: Mounts
+    noise: Mapping[str, float]
 
     def as_dict(self) -> dict[str, Any]:
         """The JSON of ``abreast calibrate``."""
@@ -54,8 +63,11 @@ class Calibration:
             result |= {"samples": bias.samples, "outliers": bias.outliers}
             for name, offset in (("range_bias", bias.range), ("bearing_bias", bias.bearing)):
                 result |= {name: offset.value, f"{name}_sd": offset.sd, f"{name}_spread": offset.spread}
+        if self.noise:
+            result["noise"] = dict(self.noise)
         cleaned: dict[str, Any] = known(result)
-        return cleaned
+        # In mounts null stands for what the motion does not tell.
+        return cleaned | {"mounts": self.mounts.as_dict()}
 
 
 def calibration_of(
@@ -66,21 +78,39 @@ def calibration_of(
     Raises :class:`UsageError` for a log that is not ours, and for one that tells nothing.
     """
     scenario = _scenario_of(log, follower)
+    mounts = mounts_of_log(log, scenario, from_s, to_s)
+    # All else rests on where the robots are, not on where their bodies seem to be.
+    scenario = with_overrides(scenario, mounts.overrides)
     timing = timing_of(log, scenario, from_s, to_s)
     sighting = topics_of(scenario).sighting
     sighted = sighting in log.topics
-    if not (timing.known or sighted):
+    if not (timing.known or sighted or mounts.known):
         raise UsageError(
             f"log {log.path}: has no sightings to calibrate (no topic {sighting!r}); "
             f"{'; '.join(timing.unknown)}"
         )
+    offsets = calibrate(log, scenario, from_s, to_s) if sighted else None
     return Calibration(
         timing=timing.keys(scenario),
         unknown=timing.unknown,
         uncertain=_uncertain(timing),
         settings=timing.settings(scenario),
-        offsets=calibrate(log, scenario, from_s, to_s) if sighted else None,
+        offsets=offsets,
+        mounts=mounts,
+        noise=noise_of_log(log, scenario, offsets, from_s, to_s),
     )
+
+
+def calibration_of_foreign(
+    log: Log, chart: TopicMap, from_s: float | None = None, to_s: float | None = None
+) -> Calibration:
+    """Calibration by a log of another lab whose topics a map names: of its mounts.
+
+    Raises :class:`UsageError` as :func:`hil.replay.foreign_log.foreign_events`.
+    """
+    mounts = mounts_of_events(foreign_events(log, chart), chart.scenario, from_s, to_s)
+    unknown = "timing and sensor offsets: looked for in logs of abreast only; turn this one into one"
+    return Calibration({}, (unknown,), False, {}, None, mounts, {})
 
 
 def _scenario_of(log: Log, follower: str | None) -> Scenario:

@@ -98,16 +98,25 @@ class LogReplay:
         """Go through the log."""
         for batch in self._bulk.batches:
             self._take(Stage(0, batch.until_ns, NOTHING, False, DONE, 0, 0), batch.records)
+            self._look()
         self._take(Stage(0, _END_OF_TIME, NOTHING, True, DONE, 0, 0), b"")
         messages = load(Extent, self.window.extent, 0).messages
         self._take(Stage(0, _END_OF_TIME, messages, True, DONE, 0, 0), b"")
+        self._look()
+
+    def _look(self) -> None:
+        for follower in self.followers:
+            follower.look()
 
     def results(self) -> tuple[KeptReplay, ...]:
         """What was kept. Raises :class:`OddLogError` where reports of nodes are none."""
         reports = self._reports.values()
         if reports is None:
             raise OddLogError
-        return tuple(each.result(self._orders.get(each.names.side, []), reports) for each in self.followers)
+        found = self._reports.found()
+        return tuple(
+            each.result(self._orders.get(each.names.side, []), reports, found) for each in self.followers
+        )
 
     def looks_back(self) -> bool:
         """Whether an input that was missing is in the log after all, too far from where it was needed."""

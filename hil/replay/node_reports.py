@@ -1,15 +1,17 @@
-"""The last report of every node in a log, without decoding all the others."""
+"""The last report of every node in a log, and what any found, without decoding all the others."""
 
 from __future__ import annotations
 
 import struct
 
 from hil.log.reader import Log, Record
+from hil.nodes.findings import PREFIX, all_found, findings_in
 from hil.wire import topics
 from hil.wire.message_types import DiagnosticArray
 from hil.wire.messages import MalformedPayloadError, to_ns
 
 _UINT32 = struct.Struct("<I")
+_PREFIX = PREFIX.encode()
 _FRAME_AT, _PLAIN = 12, b"\x00\x01"
 
 
@@ -20,24 +22,35 @@ class LastReports:
         self._log = log
         self._typename = log.topics.get(topics.DIAGNOSTICS, "")
         self._last: dict[bytes, bytes] = {}
+        self._found: dict[str, dict[str, str]] = {}
 
     def hear(self, payload: bytes) -> None:
         """Take one in the place of the one before of the same nodes."""
         key = _who(payload)
         self._last.pop(key, None)
         self._last[key] = payload
+        if _PREFIX in payload and (report := self._decoded(payload)) is not None:
+            self._found = all_found([self._found, findings_in(report)])
+
+    def found(self) -> dict[str, dict[str, str]]:
+        """Findings of all reports by the nodes' names; nodes that never had any may be left out."""
+        return self._found
+
+    def _decoded(self, payload: bytes) -> DiagnosticArray | None:
+        try:
+            message = self._log.decode(Record(topics.DIAGNOSTICS, self._typename, payload, 0, 0, 0))
+            if not isinstance(message, DiagnosticArray):
+                return None
+            to_ns(message.header.stamp)
+        except MalformedPayloadError:
+            return None
+        return message
 
     def values(self) -> dict[str, dict[str, str]] | None:
         """Values by the nodes' names; None if a last report is none, so that one before it counts."""
         found: dict[str, dict[str, str]] = {}
         for payload in self._last.values():
-            try:
-                record = Record(topics.DIAGNOSTICS, self._typename, payload, 0, 0, 0)
-                message = self._log.decode(record)
-                if not isinstance(message, DiagnosticArray):
-                    return None
-                to_ns(message.header.stamp)
-            except MalformedPayloadError:
+            if (message := self._decoded(payload)) is None:
                 return None
             for status in message.status:
                 values = {entry.key: entry.value for entry in status.values}

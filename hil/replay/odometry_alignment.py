@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from estimation.own_motion.input_alignment import UNKNOWN, Alignment, align_odometry
 from estimation.time.host_time import NO_TIME_YET, time_rows
 from formation.angles import FloatArray
+from formation.mount import robot_pose
 from formation.records import plain_rows_of
 from hil.log.reader import Log
 from hil.nodes.frame_time import time_of, time_rules
 from hil.nodes.refusals import NOT_REFUSED
 from hil.replay.kept import Kept
+from hil.scenario.leader_model import follower_mount
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.reading import RefusedError, read_frame, read_odometry
@@ -38,7 +40,7 @@ class OwnRecord:
 
 def own_record(log: Log, scenario: Scenario) -> OwnRecord:
     """Poses and odometry of a scenario's follower, without what an estimator would refuse."""
-    names = topics_of(scenario)
+    names, mount = topics_of(scenario), follower_mount(scenario)
     poses: dict[int, tuple[float, float, float]] = {}
     motions: dict[int, tuple[float, float]] = {}
     times, rows, rules = NO_TIME_YET, time_rows(plain_rows_of), time_rules(scenario)
@@ -52,7 +54,8 @@ def own_record(log: Log, scenario: Scenario) -> OwnRecord:
                 timed = time_of(times, rows, rules, frame, record.log_ns)
                 times = timed.times
                 if timed.refusal == NOT_REFUSED:
-                    poses[timed.capture_ns] = (frame.follower.x, frame.follower.y, frame.follower.theta)
+                    robot = robot_pose(frame.follower, mount)
+                    poses[timed.capture_ns] = (robot.x, robot.y, robot.theta)
         except RefusedError:
             continue
     return OwnRecord(poses, motions)

@@ -161,7 +161,7 @@ class _Feed:
         if tracks.motion is not None:
             self._motions: Rows[Odometry] = rows_of(Odometry, n)
             for k, (v, u) in enumerate(tracks.motion.tolist()):
-                store(self._motions, k, Odometry(seen_pose(Pose(0.0, 0.0, 0.0)), Motion(v, u)))
+                store(self._motions, k, Odometry(seen_pose(Pose(0.0, 0.0, 0.0)), Motion(v, u), 0))
 
     def frame(self, k: int) -> Event:
         """The mocap frame of a row."""

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from hil.log.events import Recorded, Timed
-from hil.nodes.node import Node, Outgoing
+from hil.nodes.node import Node, Outgoing, is_due
 from hil.wire.events import TICK, Event
 
 S = TypeVar("S")
 P = TypeVar("P", bound=Hashable)
+_REPORTS_NS = 500_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,13 +49,14 @@ class Execution(Generic[S]):
     """Execution of a node: the state it ended in, and all its outputs.
 
     ``repeated``: the outputs by what they repeat, empty unless it is a re-execution. ``restarts``: how often
-    it was started again.
+    it was started again. ``reports``: diagnostics of the node, every so often and at the end.
     """
 
     state: S
     outputs: tuple[Outgoing, ...]
     repeated: tuple[Repeated, ...] = ()
     restarts: int = 0
+    reports: tuple[Outgoing, ...] = ()
 
     @property
     def missing(self) -> int:
@@ -84,6 +86,7 @@ def re_execute(
     """
     state = node.begin(_first_ns(recorded))
     repeated: list[Repeated] = []
+    reports = _Reports(node)
     restarts = 0
     for number, output in enumerate(recorded):
         after, step = _repeat(node, topic, state, output, index)
@@ -94,8 +97,9 @@ def re_execute(
                 after, step, restarts = anew, again, restarts + 1
         state = after
         repeated.append(step)
+        reports.hear(state, output.computed_ns)
     outputs = tuple(message for step in repeated for message in step.outputs)
-    return Execution(state, outputs, tuple(repeated), restarts)
+    return Execution(state, outputs, tuple(repeated), restarts, reports.all(state))
 
 
 def _repeat(
@@ -120,6 +124,7 @@ def execute(node: Node[S], events: Iterable[Timed]) -> Execution[S]:
     """Execute a node on events in their order, with its own ticks where they fall due in between."""
     outputs: list[Outgoing] = []
     state: S | None = None
+    reports = _Reports(node)
     for event, now_ns in events:
         if state is None:
             state = node.begin(now_ns)
@@ -128,7 +133,34 @@ def execute(node: Node[S], events: Iterable[Timed]) -> Execution[S]:
             outputs.extend(sent)
         state, sent = node.step(state, event, now_ns)
         outputs.extend(sent)
-    return Execution(node.begin(0) if state is None else state, tuple(outputs))
+        reports.hear(state, now_ns)
+    begun = node.begin(0) if state is None else state
+    return Execution(begun, tuple(outputs), reports=reports.all(begun))
+
+
+class _Reports(Generic[S]):
+    """What a node reports while it is executed: its own ticks may not be among what is repeated."""
+
+    def __init__(self, node: Node[S]) -> None:
+        self._node = node
+        self._reports: list[Outgoing] = []
+        self._next_ns = 0
+        self._now_ns: int | None = None
+
+    def hear(self, state: S, now_ns: int | None) -> None:
+        """Ask for a report if one is due; nothing without a time."""
+        if now_ns is None:
+            return
+        self._now_ns = now_ns
+        if is_due(self._next_ns, _REPORTS_NS, now_ns):
+            self._reports.append(self._node.report(state, now_ns))
+            self._next_ns = now_ns + _REPORTS_NS
+
+    def all(self, state: S) -> tuple[Outgoing, ...]:
+        """All reports, the last one included; none of a node that nothing was heard of."""
+        if self._now_ns is None:
+            return ()
+        return (*self._reports, self._node.report(state, self._now_ns))
 
 
 def parity_of(repeated: Sequence[Repeated], topic: str, beside: Mapping[str, Sequence[bytes]]) -> Parity:

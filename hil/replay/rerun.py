@@ -12,6 +12,7 @@ from hil.log.metadata import scenario_of
 from hil.log.reader import Log
 from hil.nodes.controller import ControllerState
 from hil.nodes.estimator import EstimatorNode, EstimatorState
+from hil.nodes.findings import Findings, all_found, findings_in
 from hil.nodes.link_nodes import controller_node, estimator_node
 from hil.nodes.node import Outgoing
 from hil.replay.feeding import why_edited
@@ -46,7 +47,7 @@ class Replay:
     consumed live but are not in the log. ``certified``: estimates with radii, where these are asked for.
     ``controller``: None where there were no commands to repeat. ``restarts``: how often each node was started
     again during the run. ``fed``: why its inputs were fed in log order though nobody asked for that; empty
-    where they were not.
+    where they were not. ``found``: findings of the nodes that were executed, by their names.
     """
 
     link: Link
@@ -59,6 +60,7 @@ class Replay:
     certified: tuple[msg.CertifiedEstimate, ...] = ()
     restarts: Mapping[str, int] = field(default_factory=dict)
     fed: str = ""
+    found: Mapping[str, Findings] = field(default_factory=dict)
 
     @property
     def scenario(self) -> Scenario:
@@ -180,7 +182,15 @@ def _estimated_anew(link: Link, node: EstimatorNode, execution: Execution[Estima
     else:
         estimates = _decoded(execution.outputs, msg.LeaderEstimate)
         certified = _decoded(execution.outputs, msg.CertifiedEstimate)
-    return Replay(link, estimates, (), execution.state, missing_inputs=execution.missing, certified=certified)
+    return Replay(
+        link,
+        estimates,
+        (),
+        execution.state,
+        missing_inputs=execution.missing,
+        certified=certified,
+        found=_found(execution.reports),
+    )
 
 
 def _with_commands(
@@ -206,7 +216,12 @@ def _with_commands(
         missing_inputs=estimator.missing + execution.missing,
         certified=_decoded(estimator.outputs, msg.CertifiedEstimate),
         restarts={"estimator": estimator.restarts, "controller": execution.restarts},
+        found=_found((*estimator.reports, *execution.reports)),
     )
+
+
+def _found(reports: Iterable[Outgoing]) -> Mapping[str, Findings]:
+    return all_found(findings_in(decode_as(report.payload, msg.DiagnosticArray)) for report in reports)
 
 
 def _decoded(outputs: Iterable[Outgoing], kind: type[M]) -> tuple[M, ...]:

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from estimation.bounds.certified import Certain, Failed
 from estimation.models.measurement import Measurement
-from estimation.tracking.estimate import estimate_of
+from estimation.tracking.estimate import estimate_of, guessed_when_slow
 from estimation.tracking.follower_check import Cause
 from estimation.tracking.smoother import smooth
 from estimation.tracking.track import Tracker
@@ -17,7 +17,7 @@ from formation.records import row_of
 from hil.nodes.estimator import NAME, EstimatorNode, EstimatorState
 from hil.nodes.node import Outgoing
 from hil.nodes.status_reasons import ALL_REASONS, reason_number
-from hil.scenario.leader_model import refuse_bias_states
+from hil.scenario.leader_model import refuse_bias_states, refuse_leader_lever
 from hil.scenario.schema import Scenario
 from hil.wire.certified_message import certified_message
 from hil.wire.events import Event
@@ -34,6 +34,7 @@ class ListeningEstimator(EstimatorNode):
 
     def __init__(self, scenario: Scenario, name: str = NAME, others: frozenset[str] = frozenset()) -> None:
         refuse_bias_states(scenario)
+        refuse_leader_lever(scenario)
         ekf = replace(scenario, estimator=replace(scenario.estimator, kind="ekf"))
         super().__init__(ekf, name, others)
         self.measurements: dict[int, Measurement] = {}
@@ -73,7 +74,8 @@ def smoothed_estimates(node: ListeningEstimator) -> Smoothed:
         measurement = point.measurement
         capture_ns, frame_id = measurement.capture_ns, node.topics.follower
         status = tracker.status((point,), capture_ns)
-        estimate = estimate_of(point.belief, measurement, status, point.nis, point.used_ns, NO_JUMP)
+        told = estimate_of(point.belief, measurement, status, point.nis, point.used_ns, NO_JUMP)
+        estimate = guessed_when_slow(told, tracker.estimator.limits.v_eps)
         reason = reason_number(status, Cause.NONE)
         payload = writer.write(row_of(estimate), reason, capture_ns, ())
         estimates.append(decode_as(payload, LeaderEstimate))

@@ -1,17 +1,18 @@
 """Topic maps: how a rosbag2 log from another lab names what the estimator reads.
 
 A map is a TOML file. ``[topics]`` names the topics, either ``rigid_bodies`` or ``leader_pose`` and
-``follower_pose``, and always ``odometry`` of the follower. ``[bodies]`` names the two bodies in the frames.
+``follower_pose``, or ``sighting``, and ``odometry`` of the follower, if there is any. An entry is a topic's
+name or ``{ topic, type }``. ``[bodies]`` names the two bodies in the frames.
 ``[scenario]`` has a ``base`` (name or path) and what differs from it: noise, limits, front end.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import msgspec
 from msgspec import Struct
 
 from hil.errors import UsageError
@@ -23,19 +24,34 @@ from hil.scenario.schema import NonNegative, Scenario
 MAPS = "maps"
 
 
+class TypedTopic(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A topic, and the type by which it is read where the log has another name for that or none."""
+
+    topic: str
+    type: str
+
+
+Entry = str | TypedTopic
+
+
 class TopicNames(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Topics of a foreign log, with or without their leading slash.
 
     ``rigid_bodies``: mocap frames, or ``leader_pose``, ``follower_pose``: PoseStamped or Odometry in one
-    world frame. ``odometry``: motion of the follower, Odometry or TwistStamped. ``stamps``: ``log`` takes the
-    time of logging for the time of capture, where the stamps of the sources come from different clocks.
+    world frame. ``odometry``: motion of the follower, Odometry or TwistStamped; without it the follower's own
+    poses tell its motion. ``sighting``: the leader as the follower sees it, our RangeBearing, or PoseStamped
+    or PointStamped of the leader in the follower's own frame (x ahead, y to the left); ``leader_sighting`` is
+    another name for it. ``stamps``: ``log`` takes the time of logging for the time of capture, where the
+    stamps of the sources come from different clocks.
     ``pair_within_s``: how far apart in time two poses may be to make a frame.
     """
 
-    odometry: str
-    rigid_bodies: str | None = None
-    leader_pose: str | None = None
-    follower_pose: str | None = None
+    odometry: Entry | None = None
+    rigid_bodies: Entry | None = None
+    leader_pose: Entry | None = None
+    follower_pose: Entry | None = None
+    sighting: Entry | None = None
+    leader_sighting: Entry | None = None
     stamps: Literal["header", "log"] = "header"
     pair_within_s: NonNegative = 0.002
 
@@ -54,11 +70,25 @@ class _File(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 @dataclass(frozen=True, slots=True)
+class MappedTopics:
+    """Topics of :class:`TopicNames` without leading slashes; ``types`` of those for which the map says one."""
+
+    odometry: str | None
+    rigid_bodies: str | None
+    leader_pose: str | None
+    follower_pose: str | None
+    sighting: str | None
+    stamps: Literal["header", "log"]
+    pair_within_s: float
+    types: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
 class TopicMap:
     """A topic map with the scenario that it leads to. ``leader``, ``follower``: bodies in the frames."""
 
     path: Path
-    topics: TopicNames
+    topics: MappedTopics
     leader: str
     follower: str
     scenario: Scenario
@@ -84,27 +114,79 @@ def load_topic_map(
     if "columns" in tree:
         raise UsageError(f"{source}: maps the columns of a CSV recording; take it to: abreast import csv")
     file = checked(tree, _File, source)
-    poses = (file.topics.leader_pose, file.topics.follower_pose)
-    if file.topics.rigid_bodies is None and None in poses:
-        raise UsageError(f"{source}: topics: give rigid_bodies, or both of leader_pose and follower_pose")
-    if file.topics.rigid_bodies is not None and poses != (None, None):
-        raise UsageError(f"{source}: topics: give either rigid_bodies or leader_pose and follower_pose")
-    scenario = with_overrides(merged_scenario(file.scenario, path.stem, f"{source}: scenario"), *overrides)
+    topics = _mapped(file.topics)
+    _check_measurement(topics, source)
+    tree = _on_body(file.scenario) if topics.sighting is not None else file.scenario
+    scenario = with_overrides(merged_scenario(tree, path.stem, f"{source}: scenario"), *overrides)
+    if topics.sighting is not None:
+        _check_sighted(topics, scenario, source)
+    if topics.odometry is None and needs_odometry(scenario):
+        raise UsageError(
+            f"{source}: topics.odometry is missing, and estimator.own_motion is "
+            f"{scenario.estimator.own_motion!r}; name the topic, or set own_motion to 'auto' or 'mocap'"
+        )
     refuse_chain(scenario, "a map names the topics of two robots; leave out what sets chain")
     return TopicMap(
         path=path,
-        topics=_without_slashes(file.topics),
+        topics=topics,
         leader=leader or file.bodies.leader or scenario.leader.name,
         follower=follower or file.bodies.follower or scenario.follower.name,
         scenario=scenario,
     )
 
 
-def _without_slashes(names: TopicNames) -> TopicNames:
-    return msgspec.structs.replace(
-        names,
-        odometry=names.odometry.removeprefix("/"),
-        rigid_bodies=names.rigid_bodies and names.rigid_bodies.removeprefix("/"),
-        leader_pose=names.leader_pose and names.leader_pose.removeprefix("/"),
-        follower_pose=names.follower_pose and names.follower_pose.removeprefix("/"),
+def needs_odometry(scenario: Scenario) -> bool:
+    """Whether nothing can be estimated without the follower's odometry."""
+    return scenario.estimator.own_motion not in ("auto", "mocap")
+
+
+def _check_measurement(topics: MappedTopics, source: str) -> None:
+    poses = (topics.leader_pose, topics.follower_pose)
+    if topics.rigid_bodies is None and None in poses and (topics.sighting is None or poses != (None, None)):
+        raise UsageError(
+            f"{source}: topics: give rigid_bodies, or both of leader_pose and follower_pose, or sighting"
+        )
+    if topics.rigid_bodies is not None and poses != (None, None):
+        raise UsageError(f"{source}: topics: give either rigid_bodies or leader_pose and follower_pose")
+
+
+def _on_body(tree: Mapping[str, Any]) -> dict[str, Any]:
+    """The scenario's part of a map with sightings: on the body front end, unless it says otherwise."""
+    given = tree.get("estimator", {})
+    if not isinstance(given, dict):
+        return dict(tree)
+    return {**tree, "estimator": {"front_end": "body", **given}}
+
+
+def _check_sighted(topics: MappedTopics, scenario: Scenario, source: str) -> None:
+    if scenario.estimator.front_end != "body":
+        raise UsageError(
+            f"{source}: topics.sighting needs the body front end; set scenario.estimator.front_end = 'body'"
+        )
+    if topics.odometry is None and topics.rigid_bodies is None and topics.leader_pose is None:
+        raise UsageError(f"{source}: topics.sighting needs the follower's motion; name topics.odometry")
+
+
+def _mapped(names: TopicNames) -> MappedTopics:
+    types: dict[str, str] = {}
+
+    def bare(entry: Entry | None) -> str | None:
+        if entry is None:
+            return None
+        if isinstance(entry, str):
+            return entry.removeprefix("/")
+        name = entry.topic.removeprefix("/")
+        types[name] = entry.type
+        return name
+
+    sighting = names.sighting if names.sighting is not None else names.leader_sighting
+    return MappedTopics(
+        odometry=bare(names.odometry),
+        rigid_bodies=bare(names.rigid_bodies),
+        leader_pose=bare(names.leader_pose),
+        follower_pose=bare(names.follower_pose),
+        sighting=bare(sighting),
+        stamps=names.stamps,
+        pair_within_s=names.pair_within_s,
+        types=types,
     )

@@ -69,9 +69,9 @@ MERITS = (
         lambda value, quantity: f"{scale_of(quantity) * value:.3g}",
     ),
     Merit(
-        "RMSE / best possible",
-        "Root mean square error over the posterior Cramér-Rao bound; below 1 where the leader is calmer "
-        "than the model takes it to be.",
+        "RMSE / bound for random leaders",
+        "Root mean square error over what the posterior Cramér-Rao bound allows for random leaders of the "
+        "model's process noise. It is no bound for a leader that is calmer than that: there it is below 1.",
         _efficiency,
         lambda value, _: f"{value:.2f}",
     ),

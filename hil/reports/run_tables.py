@@ -74,6 +74,7 @@ _HEAD = (
     "log.path",
     "log.messages",
     "log.bytes",
+    "findings",
 )
 """What the head of the page says."""
 
@@ -130,8 +131,10 @@ def _quality(left: dict[str, Any]) -> str:
     columns = {
         "rmse": ("RMSE", _number),
         "max": ("largest", _number),
-        "efficiency": ("× best possible", _number),
+        "efficiency": ("× bound for random leaders", _number),
         "coverage_3sigma": ("within 3 σ", lambda share: f"{share:.2%}"),
+        "nees": ("NEES", _number),
+        "nees_limits": ("expected", lambda limits: " to ".join(map(_number, limits))),
     }
     held = {
         name: what for name, what in columns.items() if any(p.startswith(f"estimation.{name}.") for p in left)
@@ -141,8 +144,8 @@ def _quality(left: dict[str, Any]) -> str:
         cells = []
         for column, (_, tell) in held.items():
             value = left.pop(f"estimation.{column}.{name}", None)
-            scale = scale_of(name) if column in ("rmse", "max") else 1.0
-            cells.append("–" if value is None else tell(scale * value))
+            scaled = scale_of(name) * value if column in ("rmse", "max") and value is not None else value
+            cells.append("–" if value is None else tell(scaled))
         if set(cells) - {"–"}:
             rows.append((f"{symbol} [{unit}]", *cells))
     caption = f"Errors of the estimates over {left.pop('estimation.samples', 0)} samples"

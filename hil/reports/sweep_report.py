@@ -10,6 +10,7 @@ from urllib.parse import quote
 
 import numpy as np
 
+from hil.judge.consistency import nees_finding
 from hil.reports.heat_maps import (
     MERITS,
     SWITCH,
@@ -66,11 +67,14 @@ def _head(results: Mapping[str, Any]) -> str:
         verdict = f"No sound or extended bound violated in {samples} samples."
     if diverged:
         verdict += f" {diverged} runs diverged."
+    off = [text for cell in cells if (text := nees_finding(cell))]
     facts = {
         "sweep": f"{len(cells)} cells, {sum(int(cell['runs']) for cell in cells)} runs, {samples} samples",
         "simulated": f"{_duration(float(results['run_seconds']))} of driving",
         "took": _duration(float(results["wall_s"])),
     }
+    if off:
+        facts["nees"] = f"in {len(off)} of {len(cells)} cells deviations are not what errors are; {off[0]}"
     listed = "".join(f"<dt>{name}</dt><dd>{escape(text)}</dd>" for name, text in facts.items())
     return (
         f'<h1>Sweep over noise</h1>\n<div class="verdict{" bad" if bad else ""}">'
@@ -92,12 +96,21 @@ def _by_estimator(cells: Sequence[Cell]) -> str:
                     for name in ("v1", "alpha1")
                 ),
                 _median([cell.get("nis_mean") for cell in own]),
+                *(_median([cell.get("nees", {}).get(name) for cell in own]) for name in ("v1", "alpha1")),
+                str(sum(bool(nees_finding(cell)) for cell in own)),
                 *(str(sum(_violations(cell, form) for cell in own)) for form in _FORMS),
             )
         )
-    header = ("", "runs", "diverged", "v₁ / best", "α₁ / best", "NIS")
+    header = (
+        *("", "runs", "diverged", "v₁ / bound", "α₁ / bound"),
+        *("NIS", "v₁ NEES", "α₁ NEES", "cells with NEES off"),
+    )
     violated = tuple(f"outside {form}" for form in _FORMS)
-    return table_html("Medians over the cells; violations in samples", (*header, *violated), rows)
+    return table_html(
+        "Medians over the cells; the bound is that for random leaders; violations in samples",
+        (*header, *violated),
+        rows,
+    )
 
 
 def _worst(cells: Sequence[Cell]) -> str:

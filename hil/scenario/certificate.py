@@ -100,8 +100,9 @@ def _noise(scenario: Scenario) -> tuple[float, str]:
 
 def _speeds(scenario: Scenario) -> SpeedRange:
     program = scenario.leader.program
-    speeds = program.v if isinstance(program, TableProgram) else [program.v]
-    if min(speeds) <= 0.0:
+    driven = program.v if isinstance(program, TableProgram) else [program.v]
+    speeds = [abs(v) for v in driven]
+    if min(speeds) <= 0.0 or min(driven) < 0.0 < max(driven):
         return SpeedRange(scenario.leader.v_eps, scenario.leader.k_v)
     return SpeedRange(min(speeds), max(speeds))
 

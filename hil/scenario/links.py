@@ -74,7 +74,7 @@ def links_of(scenario: Scenario) -> tuple[Link, ...]:
         pair = replace(
             scenario,
             name=f"{scenario.name}/{own_name}",
-            leader=replace(leader, k_v=k_v, k_u=k_u) if place else leader,
+            leader=replace(leader, k_v=k_v, k_u=k_u, mount=scenario.follower.mount) if place else leader,
             follower=replace(scenario.follower, name=own_name, pose=own_pose),
             chain=msgspec.UNSET,
         )

@@ -18,7 +18,7 @@ from formation.spacing import Spacing
 from formation.station import Side, Station
 from hil.errors import UsageError
 from hil.scenario.brought import law_of
-from hil.scenario.leader_model import process_noise
+from hil.scenario.leader_model import finds_process_noise, process_noise
 from hil.scenario.schema import ConstantProgram, ImpulseProgram, Scenario, SinusoidProgram
 
 
@@ -84,4 +84,5 @@ def station_keeper(scenario: Scenario) -> StationKeeper:
 
 def turn_prediction(scenario: Scenario) -> TurnPrediction:
     """What is known of the leader's steering; its diffusion is that of the estimator's own model."""
-    return TurnPrediction.of(scenario.leader.k_u, process_noise(scenario).q_u)
+    found = finds_process_noise(scenario)
+    return TurnPrediction.of(scenario.leader.k_u, process_noise(scenario).q_u, inferred=found)

@@ -18,6 +18,9 @@ Span = Annotated[float, Meta(ge=0.0, le=1e5)]
 Probability = Annotated[float, Meta(ge=0.0, lt=1.0)]
 Name = Annotated[str, Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 PoseTriple = tuple[float, float, float]
+_Offset = Annotated[float, Meta(ge=-2.0, le=2.0)]
+_Yaw = Annotated[float, Meta(ge=-math.pi, le=math.pi)]
+MountTriple = tuple[_Offset, _Offset, _Yaw]
 
 LawName = Literal["independent", "ideal", "feedforward", "faded"]
 EstimatorName = Literal["ekf", "ukf", "ekf-filterpy", "ukf-filterpy", "imm", "shape-ekf", "mhe", "difference"]
@@ -26,8 +29,10 @@ OFFLINE_ESTIMATORS: tuple[OfflineName, ...] = get_args(OfflineName)
 LAW_NAMES: tuple[LawName, ...] = get_args(LawName)
 ESTIMATOR_NAMES: tuple[EstimatorName | OfflineName, ...] = (*get_args(EstimatorName), *OFFLINE_ESTIMATORS)
 FrontEnd = Literal["world", "body"]
-OwnMotion = Literal["odometry", "mocap", "fused"]
+OwnMotion = Literal["odometry", "mocap", "fused", "auto"]
+ProcessNoiseSource = Literal["estimated", "given"]
 ClockName = Literal["trusted", "estimated"]
+NoiseName = Literal["estimated", "given"]
 
 
 class _Section(Struct, frozen=True, forbid_unknown_fields=True):
@@ -65,6 +70,8 @@ class ControllerSection(_Section, frozen=True, kw_only=True):
     the robot's link, into which commands are rounded so that nothing is lost on average; 0 for a link that
     carries any value. ``command_type``: what the robot takes.
     ``tilt``: how far [rad] a follower that a speed limit holds back may turn off its bearing to close in.
+    ``mount_check``: stop a follower whose body's heading is more than 5 degrees off its direction of travel,
+    or only warn of it, so that it can be driven to calibrate.
     A law of one's own is ``file.py:function`` or ``package.module:function``; ``parameters`` are its gains.
     """
 
@@ -83,6 +90,7 @@ class ControllerSection(_Section, frozen=True, kw_only=True):
     v_resolution: NonNegative = 0.0
     u_resolution: NonNegative = 0.0
     command_type: Literal["TwistStamped", "Twist"] = "TwistStamped"
+    mount_check: Literal["stop", "warn"] = "stop"
 
 
 class ConstantProgram(_Section, frozen=True, kw_only=True, tag="constant", tag_field="kind"):
@@ -113,11 +121,11 @@ class ImpulseProgram(_Section, frozen=True, kw_only=True, tag="impulse", tag_fie
 class TableProgram(_Section, frozen=True, kw_only=True, tag="table", tag_field="kind"):
     """Speed v and turn rate u at the times t, linear in between and held at the ends.
 
-    No leader drives backwards: of who is seen by its positions the direction of motion is the heading.
+    With v < 0 the leader drives backwards: alpha1 is that of its direction of travel, and v1 = abs(v).
     """
 
     t: list[float]
-    v: list[NonNegative]
+    v: list[float]
     u: list[float]
 
 
@@ -125,6 +133,8 @@ class LeaderSection(_Section, frozen=True, kw_only=True):
     """The leader: its start pose (x, y, theta), its program and the limits that are known of it.
 
     ``v_eps <= v1 <= k_v`` and ``|u1| <= k_u`` (Assumption 1 of the paper).
+    ``mount``: where its rigid body sits on it, as far as is known: x [m] ahead of the middle of the wheel
+    axis, y [m] to the left of it, yaw [rad] from the robot's heading to the body's.
     """
 
     pose: PoseTriple
@@ -133,20 +143,41 @@ class LeaderSection(_Section, frozen=True, kw_only=True):
     v_eps: Positive = 0.02
     k_v: Positive
     k_u: Positive
+    mount: MountTriple = (0.0, 0.0, 0.0)
 
 
 class FollowerSection(_Section, frozen=True, kw_only=True):
-    """The follower: its start pose (x, y, theta) and its name on the wire."""
+    """The follower: its start pose (x, y, theta), its name on the wire, and its body's mount as the leader's.
+
+    In a chain every follower has this mount.
+    """
 
     pose: PoseTriple
     name: Name = "follower"
+    mount: MountTriple = (0.0, 0.0, 0.0)
+
+
+class OdometryFaultSection(_Section, frozen=True, kw_only=True):
+    """A fault of the emulated odometry of all followers, ``at_s`` after the leader set off.
+
+    ``silent``: no samples; ``nan``: a twist of NaN; ``zero``: a twist of 0 with a right pose; ``reversed``:
+    both with the opposite sign; ``scale``: both times ``factor``; ``delay``: samples come, and are stamped,
+    ``delay_s`` later; ``slip``: the share ``factor`` |u2| (u2 in rad/s, at most 0.9) of what the wheels turn
+    is lost; ``reset``: the pose begins anew at its origin, once. ``duration_s`` 0 stands for good.
+    """
+
+    kind: Literal["silent", "nan", "zero", "reversed", "scale", "delay", "slip", "reset"]
+    at_s: NonNegative
+    duration_s: NonNegative = 0.0
+    factor: float = 0.5
+    delay_s: Span = 0.2
 
 
 class RobotSection(_Section, frozen=True, kw_only=True):
     """The emulated robots: first-order actuator lag, limits, command resolution, wheel odometry.
 
     Odometry is noisy, stamped ``odometry_delay_s`` later than the motion that it tells of, and tells the
-    motion times ``odometry_scale_v`` and ``odometry_scale_u``.
+    motion times ``odometry_scale_v`` and ``odometry_scale_u``; its pose adds that up, without noise.
     """
 
     lag_s: NonNegative = 0.1
@@ -160,6 +191,7 @@ class RobotSection(_Section, frozen=True, kw_only=True):
     odometry_delay_s: Span = 0.0
     odometry_scale_v: Positive = 1.0
     odometry_scale_u: Positive = 1.0
+    odometry_faults: tuple[OdometryFaultSection, ...] = ()
 
 
 class FaultSection(_Section, frozen=True, kw_only=True):
@@ -183,6 +215,8 @@ class MocapSection(_Section, frozen=True, kw_only=True):
 
     Its clock is ahead of the host's by ``clock_offset_s``, runs faster by ``clock_drift_ppm``, and jumps by
     ``clock_jump_s`` when the leader has been driving for ``clock_jump_at_s``.
+    ``leader_mount``, ``follower_mount``: where the bodies really sit on the robots, as ``leader.mount`` says
+    what is known of it.
     """
 
     rate_hz: Rate = 120.0
@@ -196,6 +230,8 @@ class MocapSection(_Section, frozen=True, kw_only=True):
     clock_drift_ppm: Annotated[float, Meta(ge=-500.0, le=500.0)] = 0.0
     clock_jump_s: Annotated[float, Meta(ge=-1e7, le=1e7)] = 0.0
     clock_jump_at_s: NonNegative = 0.0
+    leader_mount: MountTriple = (0.0, 0.0, 0.0)
+    follower_mount: MountTriple = (0.0, 0.0, 0.0)
     faults: tuple[FaultSection, ...] = ()
 
 
@@ -205,8 +241,11 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``front_end`` world: leader position and follower pose from mocap; body: range and bearing of the leader
     and the follower's own motion, taken as noisy. Where commands stand in for odometry the motion comes
     ``input_delay_s`` after its signal, and up to ``input_lag_s`` later still.
-    ``own_motion``: where v2 and u2 come from: odometry, the follower's own mocap track, or both fused.
+    ``own_motion``: where v2 and u2 come from: odometry, the follower's own mocap track, both fused, or auto:
+    odometry while the track bears it out, else the track.
     ``sigma_range``, ``sigma_bearing``: of a body-frame sensor; for mocap they follow from the geometry.
+    ``noise``: estimated puts ``sigma_position``, ``sigma_heading``, ``sigma_range`` and ``sigma_bearing``
+    right by what measurements tell, from a tenth to 30 times the value; given takes them as they stand.
     ``sensor_x``, ``sensor_y``: how far [m] such a sensor sits ahead of the middle of the follower's wheel
     axis and to its left. ``range_bias`` [m], ``bearing_bias`` [rad]: by how much its values are above the
     true ones.
@@ -218,7 +257,12 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     ``stamp_offset_s``: by how much trusted stamps are later than the robot's clock was at the capture.
     ``speed_bandwidth``: q_v = speed_bandwidth * k_v^2 per second (0.01 for leaders that drive evenly, 0.1
     for those that stop and go every few seconds).
+    ``process_noise``: estimated finds both bandwidths by what is seen of the leader, from the given ones on,
+    and notices steps of its speed and turn rate (``ekf``, ``ukf``); given takes them as they are.
     ``align_odometry``: odometry is corrected by the delay and scales that the follower's mocap track shows.
+    ``slip_v2``, ``slip_u2``: share of v2 and u2 by which slip may falsify odometry; on the body front end.
+    ``settled_heading``: standard deviation [rad] of the leader's direction from which on a track is trusted
+    with it, until it is 0.25 rad above that; 0 for what suits the estimator (0.35 for most).
     ``certify``: publish a guaranteed error radius of v1 and alpha1 beside every estimate.
     ``kind`` smoother is for replays only; an estimator of one's own is ``file.py:factory`` or
     ``package.module:factory``.
@@ -226,11 +270,12 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
 
     kind: str = "ekf"
     front_end: FrontEnd = "world"
-    own_motion: OwnMotion = "odometry"
+    own_motion: OwnMotion = "auto"
     clock: ClockName = "trusted"
     transport_latency_s: Span = 0.0
     stamp_offset_s: Annotated[float, Meta(ge=-1e5, le=1e5)] = 0.0
     align_odometry: bool = False
+    noise: NoiseName = "estimated"
     sigma_position: Positive = 0.0003
     sigma_heading: Positive = 0.0035
     sigma_range: Positive = 0.01
@@ -246,8 +291,12 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     sigma_u2: Positive = 0.03
     input_delay_s: NonNegative = 0.0
     input_lag_s: NonNegative = 0.0
+    slip_v2: NonNegative = 0.1
+    slip_u2: NonNegative = 0.1
+    settled_heading: NonNegative = 0.0
     turn_bandwidth: Positive = 0.5
     speed_bandwidth: Positive = 0.01
+    process_noise: ProcessNoiseSource = "estimated"
     gate_probability: Annotated[float, Meta(gt=0.5, lt=1.0)] = 0.9999
     reacquire_frames: Annotated[int, Meta(ge=2)] = 5
     coast_after_s: Positive = 0.25

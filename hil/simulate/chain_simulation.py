@@ -16,6 +16,7 @@ from hil.judge.chain_pairs import EXACTLY, pair_figures, settling_times
 from hil.scenario import parts as scenario_parts
 from hil.scenario.noise_free_runs import chain_run
 from hil.scenario.schema import Scenario
+from hil.scenario.travel import as_travelled
 from hil.simulate.simulation import Simulation
 from hil.simulate.track_table import write_tracks
 
@@ -35,6 +36,7 @@ def simulate_chain_of(scenario: Scenario, agents: int, out: Path | None) -> Simu
     ``trajectory.csv`` and ``chain.png``, laid out like the paper's figure of a chain. Raises
     :class:`CheckFailedError` if the motion breaks down.
     """
+    scenario = as_travelled(scenario)
     duration = scenario.run.duration_s
     step = max(SAMPLE_STEP, duration * 12 * agents / MOST_CELLS)
     times = np.linspace(0.0, duration, max(2, round(duration / step) + 1))

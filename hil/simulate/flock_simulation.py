@@ -19,6 +19,7 @@ from hil.figures.flock_figures import draw_flock
 from hil.judge.chain_pairs import EXACTLY
 from hil.scenario import parts as scenario_parts
 from hil.scenario.schema import FlockSection, Scenario
+from hil.scenario.travel import as_travelled
 from hil.simulate.simulation import Simulation
 from hil.simulate.track_table import write_tracks
 
@@ -50,6 +51,7 @@ def simulate_flock_of(scenario: Scenario, flock: FlockSection, out: Path | None)
 
     Raises :class:`CheckFailedError` if the motion breaks down.
     """
+    scenario = as_travelled(scenario)
     try:
         places, trajectory = _flown(scenario, flock)
     except IntegrationError as error:

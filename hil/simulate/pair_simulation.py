@@ -20,6 +20,7 @@ from hil.scenario import parts as scenario_parts
 from hil.scenario.noise_free_runs import follower_law, noise_free_run
 from hil.scenario.ordered_sides import refusal
 from hil.scenario.schema import Scenario
+from hil.scenario.travel import as_travelled
 from hil.simulate.simulation import Simulation
 
 SAMPLE_STEP = 0.005
@@ -47,6 +48,7 @@ def simulate(scenario: Scenario, out: Path | None, *, stability: bool = False) -
     Files: ``trajectory.csv`` and the pictures ``simulation.png`` (laid out like the paper's Fig. 2) and
     ``experiment.png`` (like its Fig. 3). Raises :class:`CheckFailedError` if the motion breaks down.
     """
+    scenario = as_travelled(scenario)
     try:
         trajectory = noise_free_run(scenario, _sample_times(scenario.run.duration_s))
     except IntegrationError as error:

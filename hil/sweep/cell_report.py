@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.consistency.nees import nees_limits, samples_of_runs
 from estimation.tracking.estimate import QUANTITIES
 from hil.log.report_json import known
 from hil.sweep.spec import Cell
@@ -18,7 +19,9 @@ def report_cell(cell: Cell, tallies: NDArray[np.void], allowed: tuple[float, flo
     """Figures of a cell, from one tally for each run in the order of the runs.
 
     ``rmse`` and ``coverage_3sigma`` over all samples of all runs, those of diverged runs too. ``efficiency``:
-    RMSE over the root mean square of the posterior Cramer-Rao bound. ``tightness``: the largest of all runs.
+    RMSE over the root mean square of the posterior Cramer-Rao bound, which is that for random leaders.
+    ``nees``: over all samples too; ``nees_limits``: those of deviations that are right, by how the runs,
+    which are independent, differ among themselves. ``tightness``: the largest of all runs.
     ``formation.deviation``: RMS off the noise-free run. ``formation.certified``: share of moments at which
     the distance was in the certificate's set; absent where it has none. ``worst_run``: the one that came
     nearest to its extended bounds, among those that diverged if there are any. ``law_failed``: runs in which
@@ -44,6 +47,7 @@ def report_cell(cell: Cell, tallies: NDArray[np.void], allowed: tuple[float, flo
                 name: count / samples if samples else None
                 for name, count in zip(QUANTITIES, _total(tallies["covered"]), strict=True)
             },
+            **_nees(tallies),
             "nis_mean": _mean(tallies["nis_sum"], tallies["nis_count"]),
             "bounds": {
                 "violations": dict(zip(BOUNDS, map(int, _total(tallies["violations"])), strict=True)),
@@ -61,6 +65,16 @@ def report_cell(cell: Cell, tallies: NDArray[np.void], allowed: tuple[float, flo
         }
     )
     return result
+
+
+def _nees(tallies: NDArray[np.void]) -> dict[str, dict[str, Any]]:
+    counts, sums = tallies["nees_count"], tallies["nees_sum"]
+    nees, limits = {}, {}
+    for k, name in enumerate(QUANTITIES):
+        nees[name] = _mean(sums[:, k], counts[:, k])
+        judged = counts[:, k] > 0
+        limits[name] = nees_limits(samples_of_runs(sums[judged, k] / counts[judged, k]))
+    return {"nees": nees, "nees_limits": limits}
 
 
 def _worst(tallies: NDArray[np.void]) -> int:

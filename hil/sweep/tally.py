@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from controllers.guard import StopReason
 from estimation.bounds.bound_check import QUANTITY_OF
 from estimation.bounds.error_bounds import Perceived
+from estimation.consistency.nees import squared_sum
 from estimation.tracking.estimate import QUANTITIES
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray, wrap
@@ -37,6 +38,8 @@ TALLY = np.dtype(
         ("nis_sum", _MEASURE),
         ("squares", _MEASURE, len(QUANTITIES)),
         ("covered", _COUNT, len(QUANTITIES)),
+        ("nees_count", _COUNT, len(QUANTITIES)),
+        ("nees_sum", _MEASURE, len(QUANTITIES)),
         ("best_count", _COUNT),
         ("best_sum", _MEASURE, len(QUANTITIES)),
         ("violations", _COUNT, len(BOUNDS)),
@@ -168,9 +171,12 @@ def _add_errors(tally: NDArray[np.void], columns: Columns, errors: dict[str, Flo
     tally["nis_sum"] += nis.sum()
     for k, name in enumerate(QUANTITIES):
         if name in errors:
+            sd = columns.samples.sd[:, k]
+            total, count = squared_sum(errors[name], sd)
             tally["squares"][0, k] += np.sum(errors[name] ** 2)
-            within = np.abs(errors[name]) <= 3.0 * columns.samples.sd[:, k]
-            tally["covered"][0, k] += np.count_nonzero(within)
+            tally["covered"][0, k] += np.count_nonzero(np.abs(errors[name]) <= 3.0 * sd)
+            tally["nees_count"][0, k] += count
+            tally["nees_sum"][0, k] += total
 
 
 def _add_distances(tally: NDArray[np.void], columns: Columns) -> None:

@@ -117,7 +117,7 @@ def position_bounds(scenario: Scenario) -> PositionBounds:
 def _own_motion_noise(scenario: Scenario) -> tuple[float, float]:
     """Standard deviations of v2 [m/s] and u2 [rad/s], by where the estimator has them from."""
     given = scenario.estimator
-    if given.own_motion == "odometry":
+    if given.own_motion in ("odometry", "auto"):
         return given.sigma_v2, given.sigma_u2
     odometry = (
         FollowerMotion(0.0, 0.0, given.sigma_v2, given.sigma_u2) if given.own_motion == "fused" else None

@@ -172,13 +172,15 @@ def planar(place: Placement) -> Pose:
 
 @kernel
 def check_odometry(odometry: Odometry, latest_ns: int) -> CheckedMotion:
-    """Check a robot's own motion."""
+    """Check a robot's own motion; a pose that is not one of a robot on the ground is left out."""
     cause = ACCEPTED if odometry.sound else MALFORMED
     if cause == ACCEPTED:
         cause = _pair_of_numbers_cause(odometry.v, odometry.u, FASTEST)
     if cause == ACCEPTED and (not is_time(odometry.stamp) or ns_of(odometry.stamp) > latest_ns):
         cause = BAD_STAMP
-    return CheckedMotion(cause, ns_of(odometry.stamp), odometry.v, odometry.u)
+    has_pose = odometry.sound and place_cause(odometry.place) == ACCEPTED
+    pose = planar(odometry.place) if has_pose else Pose(0.0, 0.0, 0.0)
+    return CheckedMotion(cause, ns_of(odometry.stamp), odometry.v, odometry.u, has_pose, pose)
 
 
 @kernel

@@ -6,7 +6,7 @@ import functools
 from collections.abc import Collection
 
 from controllers.guard import CLOCK_TOLERANCE_NS
-from estimation.own_motion.odometry_history import MotionSample
+from estimation.own_motion.odometry_check import OdometrySample
 from formation.records import Rows, row_of, rows_of
 from hil.errors import AbreastError
 from hil.wire import message_types as msg
@@ -82,7 +82,7 @@ def read_frame(
     return frame
 
 
-def read_odometry(payload: bytes, now_ns: int) -> MotionSample:
+def read_odometry(payload: bytes, now_ns: int) -> OdometrySample:
     """Read and check a robot's own motion.
 
     Raises :class:`RefusedError` by cause: malformed, bad_stamp, not_finite, out_of_range.
@@ -92,7 +92,7 @@ def read_odometry(payload: bytes, now_ns: int) -> MotionSample:
     whole = in_little_endian(payload, msg.Odometry.__msgtype__)
     motion = entries.take_odometry(whole, now_ns + CLOCK_TOLERANCE_NS)
     _refuse(motion.cause)
-    return MotionSample(motion.stamp_ns, motion.v2, motion.u2)
+    return OdometrySample(motion.stamp_ns, motion.v2, motion.u2, motion.has_pose, motion.pose)
 
 
 def read_sighting(payload: bytes, now_ns: int) -> Sighting:

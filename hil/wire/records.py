@@ -98,12 +98,17 @@ class Odometry(NamedTuple):
 
 
 class CheckedMotion(NamedTuple):
-    """Measured motion of the follower, checked: v2 [m/s], u2 [rad/s], and the cause that refuses it."""
+    """Measured motion of the follower, checked: v2 [m/s], u2 [rad/s], and the cause that refuses it.
+
+    ``pose``: where it believes to be, in a frame of its own, if ``has_pose``.
+    """
 
     cause: int
     stamp_ns: int
     v2: float
     u2: float
+    has_pose: bool
+    pose: Pose
 
 
 class RangeAndBearing(NamedTuple):

@@ -19,7 +19,14 @@ from estimation.models.measurement import (
     measure_world,
 )
 from estimation.models.motion import Matrix, Vector
-from estimation.tracking.estimate import QUANTITIES, Estimate, estimate_at, estimate_of
+from estimation.tracking.estimate import (
+    GUESSED,
+    QUANTITIES,
+    Estimate,
+    estimate_at,
+    estimate_of,
+    guessed_when_slow,
+)
 from estimation.tracking.track_point import NO_JUMP, JumpUncertainty, begun
 from estimation.tracking.tracker import Status
 from formation.angles import wrap
@@ -196,3 +203,23 @@ def test_a_point_is_seen_from_the_pose_that_is_believed(known: bool) -> None:
     seen = moment._replace(seen=moment.seen._replace(follower=believed)) if known else moment
     expected = estimate_of(point.belief, seen, Status.COASTING, 2.5, 3_000, point.jump)
     assert estimate_at(point, Status.COASTING) == expected
+
+
+@given(poses, st.builds(Motion, st.floats(0.0, 0.3), st.floats(-2.0, 2.0)), poses, follower_motions)
+@settings(deadline=None)
+def test_below_v_eps_alpha1_is_a_guess_and_nothing_else_changes(
+    leader: Pose, driven: Motion, follower: Pose, own: Motion
+) -> None:
+    assume(math.dist((leader.x, leader.y), (follower.x, follower.y)) > 0.05)
+    told = estimated(world_belief(leader, driven), mocap_moment(leader, follower, own, (0.002, 0.01)))
+    humble = guessed_when_slow(told, 0.05)
+    if told.v1 >= 0.05:
+        assert humble == told
+        return
+    # Uniform on the circle: a standard deviation of pi / sqrt(3).
+    assert humble.joint.b_b == max(told.joint.b_b, math.pi**2 / 3.0)
+    assert humble._replace(joint=told.joint) == told
+    assert humble.joint._replace(b_b=told.joint.b_b) == told.joint
+    assert pytest.approx(np.var(np.linspace(-math.pi, math.pi, 100_001)), rel=1e-4) == GUESSED
+    least = np.linalg.eigvalsh(humble.covariance).min()
+    assert least >= min(0.0, np.linalg.eigvalsh(told.covariance).min()) - 1e-12

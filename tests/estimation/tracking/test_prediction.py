@@ -71,6 +71,7 @@ def reported(given: Estimate) -> Reported:
         float(given.covariance[4, 4]),
         given.v2,
         given.u2,
+        float(given.covariance[3, 4]),
     )
 
 

@@ -91,7 +91,10 @@ def test_the_more_uncertain_the_less_is_fed_forward(one: float, other: float, ah
 
 @given(rates, rates, st.floats(0.0, 2.0))
 def test_an_estimate_that_says_little_is_not_turned_further(u1: float, slow: float, ahead: float) -> None:
-    assert PREDICTION.further(TurnTrend(True, 0, u1, 1.5 * PREDICTION.spread, slow), ahead) == 0.0
+    assert (
+        PREDICTION.further(TurnTrend(True, 0, u1, 1.5 * PREDICTION.spread, slow, PREDICTION.diffusion), ahead)
+        == 0.0
+    )
 
 
 def test_an_estimate_heard_again_changes_nothing() -> None:

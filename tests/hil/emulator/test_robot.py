@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from formation.angles import FloatArray, wrap
 from formation.pose import STANDSTILL, Motion, Pose, advance
-from hil.emulator.robot import Actuators, Robot, arcs_of, drive, pose_of, standing
+from hil.emulator.robot import Actuators, Robot, arcs_of, drive, pose_of, standing, travelling
 
 TURTLEBOT = Actuators(lag=0.1, v_max=0.22, u_max=2.84, v_resolution=0.01, u_resolution=0.01)
 speeds, turns = st.floats(-0.22, 0.22), st.floats(-2.84, 2.84)
@@ -111,3 +111,13 @@ def test_whatever_is_commanded_the_wheels_get_no_more(v: float, u: float, resolu
         assert abs(found.v) <= abs(v) + 1e-9 * resolution
         assert found.v * v >= 0.0
         assert abs(found.v - max(-0.22, min(0.22, v))) <= resolution + 1e-12
+
+
+@given(motions, st.floats(-3.1, 3.1))
+def test_a_robot_is_known_by_the_way_it_travels(motion: Motion, theta: float) -> None:
+    robot = standing(Pose(0.2, -0.1, theta))._replace(motion=motion)
+    pose, ahead = travelling(robot)
+    assert ahead == Motion(abs(motion.v), motion.u)
+    assert (pose.x, pose.y) == (0.2, -0.1)
+    velocity = ahead.v * math.cos(pose.theta), ahead.v * math.sin(pose.theta)
+    assert velocity == pytest.approx((motion.v * math.cos(theta), motion.v * math.sin(theta)), abs=1e-15)

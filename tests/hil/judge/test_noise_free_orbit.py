@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from controllers.laws import LAWS
+from formation.angles import wrap
 from formation.closed_loop import Trajectory, simulate_pair
 from formation.pose import Motion
 from formation.shape import Shape
@@ -90,3 +91,23 @@ def test_nothing_to_go_by_gives_no_orbit() -> None:
     unknown = replace(truth, v1=np.full(61, math.nan))
     assert noise_free_orbit(scenario, unknown, span) is None
     assert noise_free_orbit(scenario, truth, Span(0, 1)) is None
+
+
+def test_a_leader_that_backs_up_has_an_orbit_and_one_that_turns_back_has_none() -> None:
+    scenario = load_scenario("turtlebot3")
+    run = noise_free_run(scenario, np.linspace(0.0, 6.0, 361))
+    truth, span = truth_and_span(run)
+    standing, v1, leader = np.arange(361) < 3, truth.v1.copy(), truth.leader.copy()
+    v1[standing] = 0.0
+    there = noise_free_orbit(scenario, replace(truth, v1=v1), span)
+    # One that stands is told of by its heading, until it backs up.
+    leader[standing, 2] += math.pi
+    alpha1 = np.where(standing, truth.alpha1 - math.pi, truth.alpha1)
+    back = noise_free_orbit(scenario, replace(truth, v1=v1, leader=leader, alpha1=alpha1), span)
+    assert there is not None
+    assert back is not None
+    np.testing.assert_allclose(back.rho, there.rho, rtol=1e-12)
+    np.testing.assert_allclose(wrap(back.alpha1 - there.alpha1), 0.0, atol=1e-12)
+    leader = truth.leader.copy()
+    leader[200:, 2] += math.pi
+    assert noise_free_orbit(scenario, replace(truth, leader=leader), span) is None

@@ -54,7 +54,7 @@ def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
         "frames": {"published", "received", "used", "lost", "late", "rejected"},
         "estimation": {
             *("evaluated_from_s", "samples", "untracked", "settle_s", "nis_mean"),
-            *("rmse", "max", "efficiency", "coverage_3sigma"),
+            *("rmse", "max", "efficiency", "coverage_3sigma", "nees", "nees_limits"),
         },
         "bounds": {
             *("M_rho", "M_alpha2", "v_eps", "checked", "violations", "tightness"),
@@ -77,8 +77,9 @@ def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
         "estimator",
         "law",
         "duration_s",
+        "findings",
     }
-    for name in ("rmse", "max", "efficiency", "coverage_3sigma"):
+    for name in ("rmse", "max", "efficiency", "coverage_3sigma", "nees", "nees_limits"):
         assert set(judged["estimation"][name]) == QUANTITIES
     assert set(judged["bounds"]["violations"]) == BOUNDS
     assert set(judged["formation"]["orbit_deviation_rms"]) == {"rho", "alpha1"}

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hil.judge.run_data import RunData
 from hil.judge.true_states import LONGEST_GAP_NS, TrueStates
 from hil.wire.message_types import Truth
 from hil.wire.messages import header, to_ns
@@ -70,3 +71,15 @@ def test_order_and_doubles_do_not_matter() -> None:
     states = TrueStates.of([late, early, replace(early, v1=9.0)])
     assert states.capture_ns.tolist() == [T0, T0 + STEP]
     assert states.v1.tolist() == [0.08, 0.08]
+
+
+def test_a_leader_that_backs_up_has_the_shape_of_one_that_faces_the_other_way(
+    exact_run_data: RunData,
+) -> None:
+    forwards = TrueStates.of(exact_run_data.truth)
+    turned = [
+        replace(each, leader_theta=each.leader_theta + math.pi, v1=-each.v1) for each in exact_run_data.truth
+    ]
+    backwards = TrueStates.of(turned)
+    for name in TrueStates.__slots__:
+        np.testing.assert_allclose(getattr(backwards, name), getattr(forwards, name), atol=1e-12)

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from formation.pose import STANDSTILL
+from hil.live.finding_lines import FindingLines
 from hil.live.node_worker import NodeWorker, Parting
 from hil.lockstep.run import make_nodes
 from hil.nodes.link_nodes import controller_node, estimator_node, standstill
@@ -133,3 +134,34 @@ def test_the_last_command_of_every_follower_is_a_standstill_with_the_reason() ->
     for link in links:
         drive = next(each for each in said if each.topic == f"{link.follower}/cmd_vel")
         assert read_drive(drive.payload, stamped=True) == STANDSTILL
+
+
+class Finder:
+    """A node that reports at every tick, and finds something at the second."""
+
+    name = "finder"
+    subscribes: tuple[str, ...] = ()
+
+    def begin(self, now_ns: int) -> int:
+        return 0
+
+    def due_ns(self, state: int) -> int:
+        return 0
+
+    def report(self, state: int, now_ns: int) -> Outgoing:
+        found = {"finding.clock": "an hour behind"} if state == 2 else {}
+        return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, "", found), now_ns)
+
+    def step(self, state: int, event: Event, now_ns: int) -> tuple[int, tuple[Outgoing, ...]]:
+        return state + 1, (self.report(state + 1, now_ns),)
+
+
+def test_what_a_node_finds_is_said_where_it_runs() -> None:
+    lines = list[str]()
+    worker = NodeWorker([Finder()], on_report=FindingLines(lines.append).hear)
+    worker.begin(0)
+    for now_ns in (1, 2, 3):
+        list(worker.take(TICK, now_ns))
+    begun, ended = lines
+    assert begun.startswith("finder finds clock: an hour behind; ")
+    assert ended == "finder finds clock no more"

@@ -8,10 +8,11 @@ import time
 import numpy as np
 
 from hil.live.run_monitor import RunMonitor, Snapshot
+from hil.nodes.node import diagnostics
 from hil.wire import message_types as msg
 from hil.wire.messages import encode, header, to_time
 from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
-from hil.wire.topics import Topics
+from hil.wire.topics import DIAGNOSTICS, Topics
 
 PATIENCE = 3.0
 PAIR = Topics("leader", "follower", stamped=True)
@@ -75,3 +76,20 @@ def test_a_machine_that_stands_still_makes_nobody_silent() -> None:
     assert observed(snapshot, 1, 60.0) is None
     assert observed(snapshot, 50, 0.05) is None
     assert observed(snapshot, 20, 0.05) == "estimator"
+
+
+def test_what_nodes_find_is_known_as_long_as_they_do() -> None:
+    with reserved_endpoint() as endpoint:
+        session = open_session(Endpoints(listen=endpoint))
+    monitor = RunMonitor(session, [PAIR])
+    deadline = time.monotonic() + 60.0
+    try:
+        for found in ({"finding.clock": "an hour behind"}, {}):
+            session.put(DIAGNOSTICS, encode(diagnostics("estimator", 1, "", found)))
+            wanted = {"clock": "an hour behind"} if found else {}
+            while monitor.update().findings.get("estimator") != wanted and time.monotonic() < deadline:
+                time.sleep(0.005)
+            assert monitor.snapshot.findings == {"estimator": wanted}
+    finally:
+        monitor.close()
+        close_session(session)

@@ -41,6 +41,7 @@ TORN += ["estimator.coast_after_s=0.04", "estimator.lost_after_s=0.12", "control
 OTHER_ROBOT = ["robot.v_resolution=0", "controller.v_resolution=0", "controller.transport_s=0.02"]
 OTHER_ROBOT += ["robot.lag_s=0", "controller.tick_hz=200", "mocap.rate_hz=97", "mocap.loss=0.1"]
 LATE = ["mocap.jitter_s=0.03", "robot.odometry_delay_s=0.04", "robot.odometry_scale_v=1.02"]
+AUTO = ["estimator.own_motion=auto"]
 BODY = ["estimator.front_end=body"]
 FAULTS = [
     'mocap.faults=[{kind="swap", at_s=0.8}, {kind="turn", body="follower", at_s=1.0, duration_s=0.1, '
@@ -53,6 +54,14 @@ def program(kind: str, **numbers: object) -> str:
     values = "".join(f", {name} = {value}" for name, value in numbers.items())
     return f'leader.program={{ kind = "{kind}"{values} }}'
 
+
+def lying(kind: str, **numbers: object) -> str:
+    values = "".join(f", {name} = {value}" for name, value in numbers.items())
+    return f'robot.odometry_faults=[{{ kind = "{kind}", at_s = 0.3{values} }}]'
+
+
+MOUNTED = [f"{key}=[0.05, -0.02, 0.2]" for key in ("leader.mount", "follower.mount")]
+MOUNTED += [f"mocap.{key}=[0.05, -0.02, 0.2]" for key in ("leader_mount", "follower_mount")]
 
 CASES = [
     ("turtlebot3", ["estimator.kind=ekf", *LATE, *FAULTS]),
@@ -70,14 +79,30 @@ CASES = [
         ["estimator.kind=difference", program("table", t=[0.2, 1.0], v=[0.05, 0.1], u=[0.0, 0.6])],
     ),
     ("turtlebot3", ["estimator.kind=difference", "controller.law=feedforward", *LATE, *BODY]),
+    # A leader that drives backwards, turns back, and stands.
+    (
+        "turtlebot3",
+        [program("table", t=[0, 1, 1.5, 2, 2.1], v=[-0.1, -0.1, 0.1, 0.1, 0], u=[0, 0, 0.5, 0, 0])],
+    ),
     (
         "turtlebot3",
         ["mocap.clock_offset_s=0.03", "mocap.clock_drift_ppm=200", "estimator.stamp_offset_s=0.01"],
     ),
     ("turtlebot3", ["estimator.kind=imm", "mocap.jitter_s=0.02"]),
+    ("turtlebot3", [*AUTO, *LATE]),
+    ("turtlebot3", [*AUTO, *BODY, lying("scale", factor=3.0), "mocap.jitter_s=0.02"]),
+    ("turtlebot3", [*AUTO, lying("silent"), "run.duration_s=1.5"]),
+    ("turtlebot3", [*AUTO, lying("nan"), "run.duration_s=1.5"]),
+    ("turtlebot3", [*AUTO, lying("zero")]),
+    ("turtlebot3", [*AUTO, lying("delay", delay_s=0.05), "run.duration_s=1.5"]),
+    ("chain5-turtlebot3", [*AUTO, lying("reversed"), "mocap.loss=0.1"]),
+    ("turtlebot3", ["estimator.own_motion=odometry", lying("reset"), lying("slip")]),
     ("turtlebot3", ["estimator.kind=ekf-filterpy", *BODY]),
     ("changing-sides", ["formation.change_sides_at_s=[1.0, 1.6]"]),
     ("chain5-turtlebot3", ["controller.law=ideal", "mocap.jitter_s=0.01", "mocap.loss=0.1"]),
+    ("turtlebot3", [*MOUNTED, "mocap.follower_mount=[0.02, 0.03, 0.5]", "run.duration_s=4"]),
+    ("turtlebot3", [*MOUNTED, "estimator.kind=ukf", *BODY, "mocap.jitter_s=0.02"]),
+    ("chain5-turtlebot3", MOUNTED),
 ]
 
 

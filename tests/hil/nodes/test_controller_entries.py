@@ -64,8 +64,8 @@ def event_of(state: ControllerState) -> ControlEvent:
 def test_an_estimate_is_put_down_by_what_a_command_takes_from_it() -> None:
     state = NODE.begin(NOW_NS)
     assert hear_estimate(state.lent, estimate(Status.COASTING.value), 7, NOW_NS)
-    # The variance of u1 is the last of the covariance.
-    numbers = Reported(NOW_NS - 30 * MS, NOW_NS - 40 * MS, 0.25, 1.5, 0.08, -1.5, 0.3, 0.024, 0.1, 0.2)
+    # Of the covariance, by rows, the variance of u1 is the last, its covariance with alpha1 the 20th.
+    numbers = Reported(NOW_NS - 30 * MS, NOW_NS - 40 * MS, 0.25, 1.5, 0.08, -1.5, 0.3, 0.024, 0.1, 0.2, 0.019)
     assert event_of(state) == ControlEvent(Happening.ESTIMATE.value, Status.COASTING.value, 0.0, numbers)
 
 

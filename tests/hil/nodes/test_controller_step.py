@@ -69,7 +69,7 @@ class Controller:
 
 
 def reported(capture_ns: int, **changes: float) -> Reported:
-    sound = Reported(capture_ns, capture_ns, 0.25, 1.5, 0.08, -1.5, 0.3, 0.01, 0.1, 0.3)
+    sound = Reported(capture_ns, capture_ns, 0.25, 1.5, 0.08, -1.5, 0.3, 0.01, 0.1, 0.3, -0.001)
     return sound._replace(**changes)  # type: ignore[arg-type]
 
 

@@ -3,6 +3,9 @@ from __future__ import annotations
 import pytest
 
 from controllers.guard import CLOCK_TOLERANCE_NS
+from estimation.consistency.noise_estimate import NOISE_AS_TOLD, NoiseScale, kept_noise
+from estimation.consistency.process_estimate import NOTHING_LEARNED
+from estimation.own_motion.odometry_check import UNCHECKED
 from estimation.own_motion.odometry_history import Correction
 from formation.records import load, store
 from formation.ring import EMPTY, Ring
@@ -42,12 +45,31 @@ def test_at_the_begin_nothing_is_noted() -> None:
 def test_tracks_and_odometry_lie_where_they_are_named() -> None:
     desk = memory().desk
     found = desk.memory()
-    assert all(a is b for a, b in zip(found, (desk.points, desk.history, desk.own), strict=True))
-    assert Memory._fields == ("points", "history", "own")
+    assert all(
+        a is b
+        for a, b in zip(found, (desk.points, desk.history, desk.own, desk.ways, desk.bank), strict=True)
+    )
+    assert Memory._fields == ("points", "history", "own", "ways", "bank")
+
+
+LEARNED = NOISE_AS_TOLD._replace(scale=NoiseScale(2.0, 3.0, 4.0, 5.0), gated=True)
+
+
+PROCESS = NOTHING_LEARNED._replace(speed=0.5, turn=2.0)
 
 
 def filled(desk: Desk) -> Known:
-    known = Known(Ring(1, 2), Ring(3, 4), Ring(5, 6), Correction(0.01, 0.1, 0.2))
+    check = UNCHECKED._replace(heard=True, resets=1)
+    known = NOTHING_KNOWN._replace(
+        track=Ring(1, 2),
+        odometry=Ring(3, 4),
+        own=Ring(5, 6),
+        correction=Correction(0.01, 0.1, 0.2),
+        odometry_check=check,
+        watched_ns=7,
+        noise=LEARNED,
+        process=PROCESS,
+    )
     store(desk.known, 0, known)
     return known
 
@@ -56,7 +78,9 @@ def test_without_tracks_odometry_and_its_correction_stay_known() -> None:
     desk = memory().desk
     known = filled(desk)
     forget_tracks(desk)
-    assert load(Known, desk.known, 0) == known._replace(track=EMPTY, own=EMPTY)
+    kept = known._replace(track=EMPTY, own=EMPTY, noise=kept_noise(LEARNED))
+    assert load(Known, desk.known, 0) == kept
+    assert kept.noise.scale == LEARNED.scale
 
 
 def test_what_is_forgotten_is_all_as_at_the_begin() -> None:

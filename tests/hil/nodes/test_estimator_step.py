@@ -10,11 +10,14 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 import pytest
 
+from estimation.consistency.noise_estimate import NoiseLearning
+from estimation.consistency.process_estimate import ProcessLearning
 from estimation.filters.belief import Model
 from estimation.filters.estimators import settling
 from estimation.filters.filter import Kind, filter_of
 from estimation.models.coordinated_turn import LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, PairSeen, PoseNoise
+from estimation.own_motion.odometry_check import OdometrySample
 from estimation.own_motion.odometry_history import InputTrust, MotionSample
 from estimation.own_motion.own_track import OwnNoise, OwnPoint
 from estimation.tracking.follower_check import Cause
@@ -29,7 +32,7 @@ from hil.nodes import estimator_inputs as inputs
 from hil.nodes.estimator_desk import Desk, NodeRules, Notes, SensorRules, TimedFrame
 from hil.nodes.estimator_entries import COMPILED, PLAIN
 from hil.nodes.estimator_memory import EstimatorMemory
-from hil.nodes.estimator_step import FUSED, MOCAP, ODOMETRY, Known, Rules, Told, estimate
+from hil.nodes.estimator_step import AUTO, FUSED, MOCAP, ODOMETRY, Known, Rules, Told, estimate
 from hil.nodes.frame_time import TimeRules
 from hil.nodes.status_reasons import ALL_REASONS
 from hil.scenario.files import load_scenario
@@ -44,13 +47,13 @@ FRAME_NS, ODOMETRY_NS = 8_333_333, 33_333_333
 EPOCH_NS = 1_000_000_000_000
 LIMITS = LeaderLimits(v_eps=0.04, k_v=0.1, k_u=0.7)
 NOISE = PoseNoise(3e-4, 3.5e-3)
-SOURCES = {ODOMETRY: "odometry", MOCAP: "mocap", FUSED: "fused"}
+SOURCES = {ODOMETRY: "odometry", MOCAP: "mocap", FUSED: "fused", AUTO: "auto"}
 SETUPS = list(product(Kind, FrontEnd, SOURCES))
 SETUP_IDS = [f"{kind.name.lower()}-{front_end.value}-{SOURCES[source]}" for kind, front_end, source in SETUPS]
 REASONS = packed_texts(ALL_REASONS)
 ASSUMED = AssumedErrors.of(load_scenario("turtlebot3"))
 
-Message = TimedFrame | Sighting | MotionSample
+Message = TimedFrame | Sighting | OdometrySample
 
 
 class Sent(NamedTuple):
@@ -62,17 +65,24 @@ class Sent(NamedTuple):
 
 def rules(kind: Kind, front_end: FrontEnd, source: int) -> Rules:
     """As the node has them for a scenario."""
-    settled = settling(kind.name.lower())
+    settled, noise = settling(kind.name.lower()), ProcessNoise.by_rule(LIMITS, 0.5)
+    learns = kind is not Kind.DIFFERENCE
     return Rules(
-        TrackSettings(**settled._asdict()),
-        filter_of(kind, Model(front_end, LIMITS, ProcessNoise.by_rule(LIMITS, 0.5))),
+        TrackSettings(**settled._asdict(), notices_manoeuvres=learns),
+        filter_of(kind, Model(front_end, LIMITS, noise)),
         source,
         kind is not Kind.DIFFERENCE and source != MOCAP,
         2.0,
         NOISE,
         InputTrust(5e-3, 3e-2, delay=0.004, lag=0.03, v_max=0.2, u_max=0.6),
         OwnNoise(NOISE, 0.2, 0.6),
+        ProcessLearning(learns, noise, LIMITS.k_v * LIMITS.k_v, LIMITS.k_u * LIMITS.k_u),
+        noise_learning=NoiseLearning(kind is not Kind.DIFFERENCE, NOISE, 0.04),
     )
+
+
+def with_noise_given(fixed: Rules) -> Rules:
+    return fixed._replace(noise_learning=fixed.noise_learning._replace(learns=False))
 
 
 class Outcome(NamedTuple):
@@ -99,7 +109,7 @@ class Estimator:
         self._lent = cast("Rows[Desk]", [self.desk]) if plain or not compiles() else lent(self.desk)
 
     def take(self, message: Message, now_ns: int) -> Outcome | None:
-        if isinstance(message, MotionSample):
+        if isinstance(message, OdometrySample):
             store(self.desk.sample, 0, message)
             self._steps.take(self._lent, inputs.ODOMETRY, REASONS, now_ns)
             return None
@@ -133,6 +143,8 @@ class Estimator:
             desk.points,
             desk.own,
             desk.history,
+            desk.ways,
+            desk.bank,
             desk.known,
             desk.newest,
             desk.notes,
@@ -166,9 +178,9 @@ class Pair:
         turned = Pose(own.x + shake[2], own.y + shake[3], own.theta + shake[4])
         return PairSeen(self.leader.x + shake[0], self.leader.y + shake[1], turned)
 
-    def sample(self) -> MotionSample:
+    def sample(self) -> OdometrySample:
         v, u = (self.random.standard_normal(2) * [2e-3, 1e-2]).tolist()
-        return MotionSample(self.at_ns, self.v2 + v, self.u2 + u)
+        return OdometrySample(self.at_ns, self.v2 + v, self.u2 + u, True, self.follower)
 
     def sighting(self) -> Sighting:
         dx, dy = self.leader.x - self.follower.x, self.leader.y - self.follower.y
@@ -270,7 +282,7 @@ def shuffled(sent: list[Sent], seed: int, *, frames: bool, odometry: bool) -> li
     random = np.random.default_rng([seed, 6])
     delayed = list[Sent]()
     for each in sent:
-        wanted = odometry if isinstance(each.message, MotionSample) else frames
+        wanted = odometry if isinstance(each.message, OdometrySample) else frames
         late = random.uniform(0.0, 100e6) if wanted and each.arrives_ns > EPOCH_NS + 1e8 else 0.0
         delayed.append(Sent(each.arrives_ns + late, each.message))
     return in_time(delayed)
@@ -292,7 +304,8 @@ FOLDED_IDS = [
 def test_the_order_of_delivery_does_not_matter_to_the_last_bit(
     kind: Kind, front_end: FrontEnd, source: int, frames: bool, odometry: bool
 ) -> None:
-    fixed, sent = rules(kind, front_end, source), smooth_drive(3, 240)
+    # What is learned of the noise is learned from what comes in order.
+    fixed, sent = with_noise_given(rules(kind, front_end, source)), smooth_drive(3, 240)
     straight = delivered(fixed, sent)
     other = delivered(fixed, shuffled(sent, 4, frames=frames, odometry=odometry))
     assert [point.measurement.capture_ns for point in other.track()] == [

@@ -8,10 +8,10 @@ import pytest
 
 from benchmarks.feedforward import distances_mm
 from estimation.tracking.turn_prediction import NO_TREND, TurnPrediction, TurnTrend
-from hil.nodes.leader_turn import TurnSource, trend_with, turn_when_acting, turned_further
+from hil.nodes.leader_turn import TurnSource, TurnSpread, trend_with, turn_when_acting, turned_further
 
 PREDICTION = TurnPrediction.of(k_u=0.7, diffusion=0.245)
-TREND = TurnTrend(True, 5_000, 0.3, 0.01, 0.25)
+TREND = TurnTrend(True, 5_000, 0.3, 0.01, 0.25, PREDICTION.diffusion)
 AHEAD = 0.1
 
 
@@ -20,7 +20,7 @@ AHEAD = 0.1
 def test_a_sound_estimate_joins_the_trend(u1: float, variance: float) -> None:
     for before in (NO_TREND, TREND):
         expected = PREDICTION.heard(before, 9_000, u1, variance, AHEAD)
-        assert trend_with(PREDICTION, before, 9_000, u1, variance, AHEAD) == expected
+        assert trend_with(PREDICTION, before, 9_000, u1, TurnSpread(variance, -0.001), AHEAD) == expected
         assert expected.known
 
 
@@ -32,7 +32,7 @@ def test_a_sound_estimate_joins_the_trend(u1: float, variance: float) -> None:
     ],
 )
 def test_one_that_no_sound_estimator_gives_ends_the_trend(u1: float, variance: float) -> None:
-    assert trend_with(PREDICTION, TREND, 9_000, u1, variance, AHEAD) == NO_TREND
+    assert trend_with(PREDICTION, TREND, 9_000, u1, TurnSpread(variance, -0.001), AHEAD) == NO_TREND
 
 
 def test_a_law_that_is_told_or_knows_nothing_takes_what_was_commanded() -> None:

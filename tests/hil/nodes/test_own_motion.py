@@ -128,6 +128,64 @@ def test_a_heading_that_turns_round_for_a_while_leaves_the_own_track_alone(sourc
     assert max(abs(e.v2 - OWN.v) for e in good) < 0.1
 
 
+def driven_round(count: int, lie: Motion | None) -> list[Event]:
+    """Frames, and odometry every fourth time that tells another motion, or none at all."""
+    return [
+        event
+        for k, frame in enumerate(frames(count))
+        for event in ([odometry(k, lie), frame] if lie is not None and k % 4 == 0 else [frame])
+    ]
+
+
+def findings(node: EstimatorNode, state: EstimatorState, k: int) -> dict[str, str]:
+    report = decode_as(node.report(state, EPOCH_NS + k * FRAME_NS).payload, msg.DiagnosticArray).status[0]
+    assert (report.level, report.message) == (0, "ok")
+    return {value.key: value.value for value in report.values if value.key.startswith("finding.")}
+
+
+def test_healthy_odometry_is_taken_to_the_last_bit() -> None:
+    _, by_odometry = fed(node_with("odometry"), driven_round(360, OWN))
+    node = node_with("auto")
+    state, judged = fed(node, driven_round(360, OWN))
+    assert [tuple(e.covariance) for e in judged] == [tuple(e.covariance) for e in by_odometry]
+    assert [(e.v2, e.u2, e.v1) for e in judged] == [(e.v2, e.u2, e.v1) for e in by_odometry]
+    assert findings(node, state, 360) == {}
+
+
+@pytest.mark.parametrize("front_end", ["world", "body"])
+def test_odometry_that_lies_is_named_and_the_track_takes_over(front_end: str) -> None:
+    node = node_with("auto", front_end)
+    state, found = fed(node, driven_round(480, WRONG))
+    assert set(findings(node, state, 480)) == {"finding.odometry_contradicts"}
+    assert found[120].v2 == pytest.approx(WRONG.v, abs=0.02)
+    assert np.mean([e.v2 for e in found[300:]]) == pytest.approx(OWN.v, abs=0.01)
+    assert np.mean([e.u2 for e in found[300:]]) == pytest.approx(OWN.u, abs=0.05)
+
+
+def test_odometry_that_falls_silent_ages_and_gives_way() -> None:
+    node = node_with("auto")
+    events = [*driven_round(120, OWN), *frames(360)[120:]]
+    state, found = fed(node, events)
+    assert set(findings(node, state, 360)) == {"finding.odometry_silent"}
+    sd = [math.sqrt(e.covariance.reshape(5, 5)[1, 1]) for e in found]
+    assert sd[-1] > 3.0 * sd[100]
+    assert np.mean([e.u2 for e in found[200:]]) == pytest.approx(OWN.u, abs=0.05)
+
+
+def test_without_any_odometry_auto_is_as_good_as_mocap() -> None:
+    node = node_with("auto")
+    state, found = fed(node, frames(240))
+    _, alone = fed(node_with("mocap"), frames(240))
+    assert [e.u2 for e in found[1:]] == [e.u2 for e in alone[1:]]
+    assert set(findings(node, state, 240)) == {"finding.odometry_silent"}
+
+
+def test_numbers_that_are_none_are_counted_apart() -> None:
+    node = node_with("auto")
+    state, _ = fed(node, [odometry(0, Motion(math.nan, 0.0)), *frames(60)])
+    assert state.refused == {"odometry_not_finite": 1}
+
+
 def test_bounds_take_the_noise_of_the_source_for_granted() -> None:
     E_v2 = {source: node_with(source).rules.assumed.E_v2 for source in ("odometry", "mocap", "fused")}
     assert E_v2["odometry"] == pytest.approx(3.0 * 0.005)

@@ -16,6 +16,15 @@ alpha2 = "bearing"
 v2 = { constant = 0.1 }
 u2 = { column = "gyro", scale = 0.017, offset = -0.1 }
 """
+POSES = """
+[columns]
+t = "t"
+leader_x = "lx"
+leader_y = "ly"
+follower_x = "fx"
+follower_y = "fy"
+follower_theta = "ft"
+"""
 SCENARIO = '[scenario.estimator]\nfront_end = "body"\n'
 
 
@@ -37,6 +46,12 @@ def test_an_entry_is_a_column_a_scaled_column_or_a_constant(tmp_path: Path) -> N
     assert chart.scenario.name == "lab"
     assert chart.sighted
     assert not chart.commanded
+
+
+def test_poses_alone_tell_the_followers_motion(tmp_path: Path) -> None:
+    chart = load_column_map(written(tmp_path, POSES))
+    assert not chart.moved
+    assert chart.scenario.estimator.own_motion == "auto"
 
 
 def test_every_shipped_map_is_one_and_is_found_by_its_name() -> None:
@@ -73,6 +88,9 @@ def test_every_shipped_map_is_one_and_is_found_by_its_name() -> None:
             BODY.replace("rho", "leader_x").replace("alpha2", "leader_y"),
             r"follower_theta, follower_x, follower_y",
         ),
+        (BODY.replace("v2 = { constant = 0.1 }\n", "") + SCENARIO, r"columns: v2 missing; name a column"),
+        (BODY[: BODY.index("v2")] + SCENARIO, r"columns: u2, v2 missing; name columns"),
+        (POSES + '[scenario.estimator]\nown_motion = "fused"\n', r"columns: u2, v2 missing; name columns"),
         ("[topics]", r"map lab: maps the topics of a log; take it to: abreast replay"),
         (BODY, r"range and bearing need the body front end; set scenario\.estimator\.front_end = 'body'"),
         ('inputs = "guessed"\n' + BODY + SCENARIO, r"inputs is 'guessed'"),

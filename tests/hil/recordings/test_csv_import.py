@@ -61,6 +61,8 @@ u2 = "u2"
 base = "turtlebot3"
 """
 
+POSES_ALONE = POSE_MAP.replace('v2 = "v2"\nu2 = "u2"\n', "")
+
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> list[Truth]:
@@ -116,7 +118,9 @@ def errors(played: Replay, truth: list[Truth], from_s: float) -> tuple[float, fl
     return float(np.sqrt(np.mean(np.square(v1)))), float(np.sqrt(np.mean(np.square(alpha1))))
 
 
-@pytest.mark.parametrize(("text", "most"), [(BODY_MAP, (0.003, 0.05)), (POSE_MAP, (0.001, 0.04))])
+@pytest.mark.parametrize(
+    ("text", "most"), [(BODY_MAP, (0.003, 0.05)), (POSE_MAP, (0.001, 0.04)), (POSES_ALONE, (0.001, 0.04))]
+)
 def test_a_recording_with_noise_gives_estimates_close_to_the_truth(
     text: str, most: tuple[float, float], driven: list[Truth], tmp_path: Path
 ) -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from hil.errors import UsageError
 from hil.recordings.column_map import ColumnMap, load_column_map
-from hil.recordings.csv_table import read_rows
+from hil.recordings.csv_table import read_rows, read_table
 
 MAP = """
 [columns]
@@ -91,7 +91,7 @@ def test_times_keep_every_nanosecond(tmp_path: Path, times_ns: list[int]) -> Non
         ("a,b\n1,2\n", r"column 'time' of map .* is missing; columns there: a, b"),
         (HEAD.replace("speed", "gyro") + ROWS, r"line 1: column 'gyro' is there 2 times"),
         (HEAD + ROWS.replace("0.3", "fast"), r"line 3, column 'gyro': 'fast', expected a number"),
-        (HEAD + ROWS.replace("0.3", ""), r"line 3, column 'gyro': empty, expected a number"),
+        (HEAD + ROWS.replace("210,0.2", "210,"), r"line 3, column 'bearing': empty, expected a number"),
         (HEAD + ROWS.replace("0.3", "1_000"), r"line 3, column 'gyro': '1_000', expected a number"),
         (HEAD + ROWS.replace("0.3", "nan"), r"line 3, column 'gyro': nan, expected a finite number"),
         (
@@ -132,3 +132,25 @@ def test_a_mistake_in_a_recording_is_one_line_with_its_place(
 def test_a_recording_that_cannot_be_opened_is_said_so(name: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=said):
         read_rows(tmp_path / name, chart(tmp_path))
+
+
+def test_columns_of_several_rates_share_a_table(tmp_path: Path) -> None:
+    text = HEAD + "0.1,1,10,0.2,0.1\n0.2,,,0.3,0.1\n0.3,,,,\n0.4,1.1,11,,\n"
+    rows = read_rows(recording(tmp_path, text), chart(tmp_path))
+    assert [sorted(row.columns) for row in rows] == [
+        ["alpha2", "rho", "u2", "v2"],
+        ["u2", "v2"],
+        [],
+        ["alpha2", "rho"],
+    ]
+
+
+def test_a_column_that_is_empty_throughout_is_a_mistake(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="is empty in all rows"):
+        read_rows(recording(tmp_path, HEAD + "0.1,,,0.2,0.1\n"), chart(tmp_path))
+
+
+def test_a_line_that_the_file_ends_in_is_left_out_and_told(tmp_path: Path) -> None:
+    found = read_table(recording(tmp_path, HEAD + ROWS + "0.7,1.0"), chart(tmp_path))
+    assert (len(found.rows), found.torn) == (2, 4)
+    assert read_table(recording(tmp_path, HEAD + ROWS), chart(tmp_path)).torn == 0

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__PointStamped as PointStamped
 from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__PoseStamped as PoseStamped
 
 from formation.pose import Motion, Pose
@@ -101,7 +102,7 @@ def bag(folder: Path, sent: list[Sent]) -> Log:
         connections = {}
         for each in sorted(sent, key=lambda each: each.log_ns):
             if each.topic not in connections:
-                if isinstance(each.message, msg.RigidBodies):
+                if isinstance(each.message, msg.RigidBodies | msg.RangeBearing):
                     connections[each.topic] = writer.add_connection(
                         each.topic,
                         each.message.__msgtype__,
@@ -242,3 +243,87 @@ def test_a_topic_that_holds_rubbish_only_is_named(topic: str, said: str, tmp_pat
             out.write(each.topic, typename_of(each.message), payload, each.log_ns, each.log_ns)
     with pytest.raises(UsageError, match=said):
         replay_foreign(read_log(tmp_path / "bad.mcap"), load_topic_map(str(chart(tmp_path, POSES))))
+
+
+@pytest.mark.parametrize("named", [True, False])
+@pytest.mark.parametrize("source", ["auto", "mocap"])
+def test_a_bag_without_odometry_gives_the_leaders_motion_all_the_same(
+    named: bool, source: str, tmp_path: Path
+) -> None:
+    log = bag(tmp_path, [each for each in lab() if each.topic not in ("/tb2/odom", "/tb2/twist")])
+    text = POSES if named else POSES.replace('odometry = "/tb2/odom"', "")
+    played = replay_foreign(
+        log, load_topic_map(str(chart(tmp_path, text)), None, None, [f"estimator.own_motion={source}"])
+    )
+    assert played.estimates[-1].v1 == pytest.approx(V1, abs=0.01)
+
+
+SIGHTINGS = """
+[topics]
+odometry = "/tb2/odom"
+sighting = ENTRY
+[scenario.estimator]
+sigma_range = 0.002
+sigma_bearing = 0.005
+"""
+
+
+def sightings_map(entry: str) -> str:
+    return SIGHTINGS.replace("ENTRY", entry)
+
+
+def seen_by_follower(kind: str, stamp_ns: int, t: float) -> msg.Message:
+    """The leader in the follower's own frame."""
+    true = shape_of(leader_at(t), follower_at(t))
+    if kind == "RangeBearing":
+        return msg.RangeBearing(header(stamp_ns, "tb2"), true.rho, true.alpha2)
+    x, y = true.rho * math.cos(true.alpha2), true.rho * math.sin(true.alpha2)
+    point = msg.Point(x=x, y=y, z=0.2)
+    if kind == "PointStamped":
+        return PointStamped(header=header(stamp_ns, "tb2"), point=point)
+    nowhere = msg.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
+    return PoseStamped(header=header(stamp_ns, "tb2"), pose=msg.Pose(position=point, orientation=nowhere))
+
+
+def sighting_lab(kind: str) -> list[Sent]:
+    """20 s of odometry at 50 Hz and sightings at 5 Hz."""
+    sent: list[Sent] = []
+    for number in range(1000):
+        at_ns, t = START_NS + number * 20_000_000, number * 0.02
+        odometry = odometry_message(at_ns, "tb2", follower_at(t), Motion(V2, U))
+        sent.append(Sent("/tb2/odom", odometry, at_ns + 1_000_000))
+        if number % 10 == 0:
+            sent.append(Sent("/tb2/leader", seen_by_follower(kind, at_ns, t), at_ns + 5_000_000))
+    return sent
+
+
+@pytest.mark.parametrize("kind", ["RangeBearing", "PointStamped", "PoseStamped"])
+def test_a_topic_of_sightings_gives_the_leaders_motion(kind: str, tmp_path: Path) -> None:
+    log = bag(tmp_path, sighting_lab(kind))
+    mapped = load_topic_map(str(chart(tmp_path, sightings_map('"/tb2/leader"'))))
+    assert mapped.scenario.estimator.front_end == "body"
+    last = replay_foreign(log, mapped).estimates[-1]
+    t = (to_ns(last.header.stamp) - START_NS) * 1e-9
+    true = shape_of(leader_at(t), follower_at(t))
+    assert last.status == 1
+    assert last.rho == pytest.approx(true.rho, abs=5e-3)
+    assert last.v1 == pytest.approx(V1, abs=5e-3)
+    assert last.alpha1 == pytest.approx(true.alpha1, abs=0.1)
+
+
+def test_a_type_that_is_told_stands_for_the_logs_own(tmp_path: Path) -> None:
+    log = bag(tmp_path, sighting_lab("PointStamped"))
+    entry = '{ topic = "/tb2/leader", type = "geometry_msgs/msg/Twist" }'
+    mapped = load_topic_map(str(chart(tmp_path, sightings_map(entry))))
+    with pytest.raises(
+        UsageError, match=r"'/tb2/leader' is geometry_msgs/msg/Twist, expected .*PointStamped"
+    ):
+        replay_foreign(log, mapped)
+
+
+def test_sightings_need_the_body_front_end_and_odometry(tmp_path: Path) -> None:
+    text = sightings_map('"/tb2/leader"')
+    with pytest.raises(UsageError, match="front_end = 'body'"):
+        load_topic_map(str(chart(tmp_path, text + 'front_end = "world"\n')))
+    with pytest.raises(UsageError, match=r"name topics\.odometry"):
+        load_topic_map(str(chart(tmp_path, text.replace('odometry = "/tb2/odom"', ""))))

@@ -219,7 +219,11 @@ def without(*gone: str) -> Change:
     ("change", "overrides", "said"),
     [
         (without(topics.RIGID_BODIES), (), "has no measurement of the leader, expected topic 'rigid_bodies'"),
-        (without("follower/odom"), (), "has no odometry of follower 'follower'"),
+        (
+            without("follower/odom"),
+            ("estimator.own_motion=odometry",),
+            "has no odometry of follower 'follower'",
+        ),
         (without(), ("follower.name=burger",), "follower 'burger' is not among .* one of: follower, leader"),
         (without(), ("leader.name=burger",), "leader 'burger' is not among .* one of: follower, leader"),
     ],
@@ -232,6 +236,18 @@ def test_a_log_that_lacks_something_is_refused_by_name(
     assert scenario is not None
     with pytest.raises(UsageError, match=said):
         replay(log, with_overrides(scenario, overrides))
+
+
+@pytest.mark.parametrize("source", ["auto", "mocap"])
+def test_a_log_without_odometry_is_replayed_by_the_poses_alone(
+    source: str, rough_log: Log, tmp_path: Path
+) -> None:
+    log = rewritten(rough_log, tmp_path / "poses.mcap", without("follower/odom"))
+    scenario = scenario_of(log)
+    assert scenario is not None
+    played = replay(log, with_overrides(scenario, [f"estimator.own_motion={source}"]))
+    assert len(played.estimates) > 200
+    assert all(abs(each.v1) < 0.3 for each in played.estimates)
 
 
 def test_sightings_without_the_body_front_end_are_refused(tmp_path: Path) -> None:

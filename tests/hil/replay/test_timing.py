@@ -96,7 +96,7 @@ def test_a_span_that_is_too_short_for_stamps_may_tell_the_lag(run_log: Path) -> 
 @pytest.mark.parametrize(
     ("left_out", "named"),
     [
-        (("follower/odom",), "no odometry on 'follower/odom'"),
+        (("follower/odom", "rigid_bodies"), "no odometry on 'follower/odom'"),
         (
             ("follower/command", "follower/cmd_vel", "rigid_bodies"),
             "no commands on 'follower/command' or 'follower/cmd_vel'; offset of stamps unknown: the log has "

@@ -36,7 +36,10 @@ leader = {{ name = "first", program = {{ kind = "constant", v = 0.1 }} }}
     [
         (TOPICS + "odom = 1", r"map lab: \[topics\] has an unknown key 'odom'; did you mean 'odometry'"),
         ('[topic]\nodometry = "o"', r"unknown key 'topic'; did you mean 'topics'|topics"),
-        ('[topics]\nrigid_bodies = "/frames"', r"topics: missing required field odometry"),
+        (
+            '[topics]\nrigid_bodies = "/frames"\n[scenario.estimator]\nown_motion = "fused"',
+            r"topics.odometry is missing, and estimator.own_motion is 'fused'",
+        ),
         ('[topics]\nodometry = "/odom"', r"give rigid_bodies, or both of leader_pose and follower_pose"),
         ('[topics]\nodometry = "o"\nleader_pose = "l"', r"give rigid_bodies, or both"),
         (TOPICS + 'leader_pose = "l"', r"give either rigid_bodies or leader_pose and follower_pose"),
@@ -55,6 +58,12 @@ def test_a_mistake_in_a_map_is_one_line_that_helps(text: str, said: str, tmp_pat
     with pytest.raises(UsageError, match=said) as caught:
         load_topic_map(written(tmp_path, text))
     assert "\n" not in str(caught.value)
+
+
+def test_a_map_may_do_without_odometry(tmp_path: Path) -> None:
+    chart = load_topic_map(written(tmp_path, '[topics]\nrigid_bodies = "/frames"'))
+    assert chart.topics.odometry is None
+    assert chart.scenario.estimator.own_motion == "auto"
 
 
 def test_a_map_that_is_not_there_is_said_so() -> None:

@@ -18,6 +18,7 @@ from hil.figures.plot_data import PlotData
 from hil.judge.run_data import RunData, run_data_of_log
 from hil.judge.summary import summarise
 from hil.log.reader import Log
+from hil.nodes.findings import advice_on
 from hil.reports.run_report import run_report
 from hil.wire.message_types import CertifiedEstimate
 from tests.hil.reports.open_page import open_page
@@ -183,3 +184,11 @@ def test_a_report_is_written_without_the_python_classes_of_the_plotting_library(
 def test_commands_load_what_draws_only_when_they_draw() -> None:
     loads = "import sys, hil.command_line, hil.commands.run, hil.commands.replay, hil.commands.daemon"
     subprocess.run([sys.executable, "-c", f"{loads}; sys.exit('matplotlib' in sys.modules)"], check=True)
+
+
+def test_what_was_found_is_in_the_head_with_what_to_do(exact_run_data: RunData) -> None:
+    found = {"estimator": {"odometry_silent": "no odometry for <3 s>"}}
+    page = report(replace(exact_run_data, found=found))
+    assert f"odometry_silent: no odometry for <3 s>; {advice_on('odometry_silent')}" in words(page)
+    assert "<3 s>" not in page
+    assert "[{" not in words(page)

@@ -120,7 +120,16 @@ def test_what_cells_do_not_know_is_left_out(results: dict[str, Any]) -> None:
         each["bounds"] = {}
     said = words(sweep_report(results))
     assert not re.search(r"\b(nan|None|inf)\b", said)
-    assert "difference 3600 18 – – – 0 0 0" in said
+    assert "difference 3600 18 – – – – – 0 0 0 0" in said
+
+
+def test_cells_whose_deviations_are_not_what_errors_are_are_counted(results: dict[str, Any]) -> None:
+    assert "cells deviations are not" not in words(sweep_report(results))
+    for each in results["cells"][:3]:
+        each["nees"], each["nees_limits"] = {"v1": 0.25}, {"v1": [0.9, 1.1]}
+    said = words(sweep_report(results))
+    assert "in 3 of 108 cells deviations are not what errors are" in said
+    assert "too modest: v1 0.25 (expected 0.9 to 1.1)" in said
 
 
 def test_an_empty_sweep_is_a_page_too() -> None:

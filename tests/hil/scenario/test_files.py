@@ -34,8 +34,8 @@ TABLE = "leader.program={kind='table', t=[0.0, 1.0], v=[0.1, 'fast'], u=[0, 0]}"
         ("mocap.rate_hz=-120", r"mocap\.rate_hz is -120: expected float >= 0\.01"),
         ("mocap.rate_hz=1e300", r"mocap\.rate_hz is 1e\+300: expected float <= 10000"),
         (
-            'leader.program={kind = "table", t = [0, 1], v = [0.1, -0.1], u = [0, 0]}',
-            r"leader\.program\.v\[1\] is -0\.1: expected float >= 0\.0",
+            'leader.program={kind = "constant", v = -0.1}',
+            r"leader\.program\.v is -0\.1: expected float >= 0\.0",
         ),
         ("formation.rho_0=0", r"formation\.rho_0 is 0: expected float > 0\.0"),
         ("formation.rho_0=nan", r"formation\.rho_0 is nan, expected a finite number"),

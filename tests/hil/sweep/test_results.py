@@ -75,7 +75,7 @@ def test_a_cell_of_one_run_has_the_figures_of_its_lockstep_run(
         wanted = summarise(run_data_of_log(read_log(log)))
         estimation, bounds = wanted["estimation"], wanted["bounds"]
         assert found["samples"] == estimation["samples"]
-        for name in ("rmse", "coverage_3sigma", "efficiency"):
+        for name in ("rmse", "coverage_3sigma", "efficiency", "nees"):
             assert found[name] == pytest.approx(estimation[name], rel=1e-6)
         assert found["nis_mean"] == pytest.approx(estimation["nis_mean"], rel=1e-9)
         assert found["bounds"]["violations"] == bounds["violations"]
@@ -98,6 +98,8 @@ def test_every_sound_and_extended_bound_holds_over_a_grid_of_noise(
             assert cell["samples"] > 1700
             assert 1.7 < cell["nis_mean"] < 2.2
             assert min(cell["coverage_3sigma"].values()) > 0.99
+            for low, high in cell.get("nees_limits", {}).values():
+                assert low < 1.0 < high
 
 
 def test_an_interrupted_sweep_goes_on_and_ends_the_same(

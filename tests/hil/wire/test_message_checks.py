@@ -216,8 +216,17 @@ def test_odometry_is_two_believable_numbers(v: float, u: float, cause: Cause) ->
     found = check_odometry(Odometry(True, SOUND, place(), v, u), LATEST_NS)
     assert found[:2] == (cause, LATEST_NS)
     if cause == Cause.ACCEPTED:
-        assert found == CheckedMotion(cause, LATEST_NS, v, u)
+        assert found == CheckedMotion(cause, LATEST_NS, v, u, True, planar(place()))
     assert check_odometry(Odometry(False, SOUND, place(), v, u), LATEST_NS).cause == Cause.MALFORMED
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [place()._replace(x=math.nan), place()._replace(qw=0.0, qz=0.0), place()._replace(y=2.0 * FARTHEST)],
+)
+def test_a_pose_that_is_none_does_not_spoil_the_motion(bad: Placement) -> None:
+    found = check_odometry(Odometry(True, SOUND, bad, 0.1, 0.2), LATEST_NS)
+    assert found == CheckedMotion(Cause.ACCEPTED, LATEST_NS, 0.1, 0.2, False, Pose(0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(

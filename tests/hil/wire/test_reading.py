@@ -152,6 +152,7 @@ def test_sightings_are_refused_by_their_cause(payload: bytes, cause: str) -> Non
 def test_sound_odometry_and_sightings_come_through() -> None:
     sample = read_odometry(odometry(0.1, -0.4), NOW_NS)
     assert (sample.stamp_ns, sample.v2, sample.u2) == (STAMP_NS, 0.1, -0.4)
+    assert sample.has_pose
     seen = read_sighting(sighting(0.7, -2.0), NOW_NS)
     assert (seen.capture_ns, seen.rho, seen.alpha2) == (STAMP_NS, 0.7, -2.0)
 

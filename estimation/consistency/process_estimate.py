@@ -1,0 +1,297 @@
+"""The leader's process noise, found: a bank of filters that differ by it, weighed by how well they predict.
+
+Some filters share all but the density q_v that drives the speed, others all but q_u that drives the turn
+rate, each in steps of a constant ratio from a leader that never changes to one that does as it likes. They
+run beside the main filter on what this has believed, put together over a thirtieth of a second, since noise
+is a slow thing to learn. The score of each is the logarithm of its likelihood, forgotten over half a minute.
+
+Between members the score is that of white noise whose power is told wrongly by the ratio e^y (Whittle):
+K (y + exp(-y)), highest where y = 0. Three members around the best one tell where that is.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from estimation.filters.ekf import informed
+from estimation.filters.filter import EKF, Filter
+from estimation.filters.gaussian import Gaussian, nis_of
+from estimation.models.coordinated_turn import FollowerMotion, ProcessNoise, Spread, mean_motion
+from estimation.models.measurement import NO_MOTION, Measurement
+from estimation.tracking.track_point import TrackPoint
+from formation.kernel import kernel
+from formation.records import Rows, load, store
+
+TURN_MEMBERS, TURN_RATIO, TURN_LOWEST = 7, 4.0, 4.0**-5
+"""Members for the turn rate, ratio between them, and the lowest bandwidth: from 0.001 to 4 per second."""
+
+SPEED_MEMBERS, SPEED_RATIO, SPEED_LOWEST = 8, 8.0, 8.0**-7
+"""Members for the speed: from 5e-7 to 1 per second."""
+
+MEMBERS = TURN_MEMBERS + SPEED_MEMBERS
+
+FORGOTTEN = 30.0
+"""Time [s] in which scores are forgotten."""
+
+SHARE = 0.8
+"""Share of the likeliest noise that is taken. For leaders that move as the filter's model says it makes
+errors larger than reported by a tenth; for those that steer smoothly what is reported is too large by more.
+"""
+
+_TOLD_SD = math.log(10.0)  # what is told is known to a factor of ten
+_SPEED_FALLING, _TURN_FALLING = 0.75, 0.25  # [1/s]: who drives calmly for a while need not be calm
+_INTERVAL_NS = 30_000_000
+_SETTLING_NS = 500_000_000
+_LARGEST_NIS = 400.0  # a member further off starts again from the main filter
+_NS = 1e-9
+_SAME = 1e-6  # [s]
+
+
+class ProcessLearning(NamedTuple):
+    """Whether process noise is learned, what is told of it, and the densities that bandwidths are shares of.
+
+    ``speed`` [m^2/s^3]: k_v^2 per second, ``turn`` [rad^2/s^3]: k_u^2 per second.
+    """
+
+    on: bool
+    told: ProcessNoise
+    speed: float
+    turn: float
+
+
+class Member(NamedTuple):
+    """One filter of the bank: its belief, and the logarithm of its likelihood up to a constant of all."""
+
+    belief: Gaussian
+    score: float
+
+
+class Trial(NamedTuple):
+    """What a member is tried by: its noise, the time to a measurement, the share of scores kept, and that."""
+
+    noise: ProcessNoise
+    dt: float
+    kept: float
+    x: float
+    y: float
+    spread: Spread
+
+
+class LearnedProcess(NamedTuple):
+    """What has been learned, and what is being put together for the bank.
+
+    speed, turn: ratios of q_v and q_u to what is told. settled_ns: since when the track is settled, 0 if it
+    is not. begun: whether the bank runs. at_ns: time of its beliefs. ended_ns: capture of the last
+    measurement in them; motion: of the follower then. count, later_ns, x, y: number of measurements put
+    together since, the sum of their times after ``ended_ns``, and sums of positions. way_s, way:
+    time [s] since ``ended_ns`` over which the follower's way is known, and the sums of its motion over that,
+    its variances times time.
+    """
+
+    speed: float
+    turn: float
+    settled_ns: int
+    begun: bool
+    at_ns: int
+    ended_ns: int
+    motion: FollowerMotion
+    count: int
+    later_ns: int
+    x: float
+    y: float
+    way_s: float = 0.0
+    way: FollowerMotion = NO_MOTION
+
+
+NOTHING_LEARNED = LearnedProcess(1.0, 1.0, 0, False, 0, 0, FollowerMotion(0.0, 0.0, 0.0, 0.0), 0, 0, 0.0, 0.0)
+
+
+@kernel
+def learned_noise(learned: LearnedProcess, rules: ProcessLearning) -> ProcessNoise:
+    """Process noise to take."""
+    told = rules.told
+    return told._replace(q_v=told.q_v * learned.speed, q_u=told.q_u * learned.turn, q_across=told.q_v)
+
+
+@kernel(inline=False)
+def learn(
+    learned: LearnedProcess, bank: Rows[Member], point: TrackPoint, rules: ProcessLearning, estimator: Filter
+) -> LearnedProcess:
+    """Learn from a measurement in its order that the main filter has used: the newest point of its track."""
+    measurement, belief, settled = point.measurement, point.belief, point.settled
+    now_ns = measurement.capture_ns
+    if not learned.begun:
+        return _waiting(learned, bank, measurement, belief, settled)
+    since_ns = now_ns - learned.ended_ns
+    count, later_ns = learned.count + 1, learned.later_ns + since_ns
+    x, y = learned.x + measurement.x, learned.y + measurement.y
+    if not measurement.in_world:
+        # Along the follower's axes, which turn, positions of different times have no mean.
+        count, later_ns, x, y = 1, since_ns, measurement.x, measurement.y
+    learned = _with_way(learned, point)
+    learned = learned._replace(count=count, later_ns=later_ns, x=x, y=y)
+    if since_ns < _INTERVAL_NS:
+        return learned
+    return _scored(learned, bank, measurement, belief, rules, estimator)
+
+
+@kernel
+def _with_way(learned: LearnedProcess, point: TrackPoint) -> LearnedProcess:
+    """The same with the follower's way to a point added; in the world frame that makes no difference."""
+    if point.measurement.in_world:
+        return learned
+    was, way, dt = learned.way, point.way, point.way_s
+    added = FollowerMotion(
+        was.v2 + way.v2 * dt,
+        was.u2 + way.u2 * dt,
+        was.sd_v2 + way.sd_v2 * way.sd_v2 * dt,
+        was.sd_u2 + way.sd_u2 * way.sd_u2 * dt,
+    )
+    return learned._replace(way_s=learned.way_s + dt, way=added)
+
+
+@kernel
+def _way_of(learned: LearnedProcess, measurement: Measurement, dt: float) -> FollowerMotion:
+    """Mean motion since the members' time: by the whole way where that is known, else by its ends."""
+    way, span = learned.way, learned.way_s
+    if measurement.in_world or abs(span - dt) > _SAME:
+        return mean_motion(learned.motion, measurement.motion)
+    by = 1.0 / span
+    return FollowerMotion(way.v2 * by, way.u2 * by, math.sqrt(way.sd_v2 * by), math.sqrt(way.sd_u2 * by))
+
+
+@kernel
+def restarted(learned: LearnedProcess) -> LearnedProcess:
+    """What is kept when the track has started anew: all that was learned, but the bank must start again."""
+    return learned._replace(begun=False, settled_ns=0)
+
+
+@kernel
+def _waiting(
+    learned: LearnedProcess, bank: Rows[Member], measurement: Measurement, belief: Gaussian, settled: bool
+) -> LearnedProcess:
+    """Start the bank from the main filter's belief once its track has been settled for a while.
+
+    Before that errors are those of the linearisation, for which no process noise is to blame.
+    """
+    now_ns = measurement.capture_ns
+    if not settled:
+        return learned._replace(settled_ns=0)
+    if learned.settled_ns == 0:
+        return learned._replace(settled_ns=now_ns)
+    if now_ns - learned.settled_ns < _SETTLING_NS:
+        return learned
+    for k in range(MEMBERS):
+        # Scores of zero where there are none yet: rows begin with that.
+        store(bank, k, load(Member, bank, k)._replace(belief=belief))
+    return learned._replace(
+        begun=True,
+        at_ns=now_ns,
+        ended_ns=now_ns,
+        motion=measurement.motion,
+        count=0,
+        later_ns=0,
+        x=0.0,
+        y=0.0,
+        way_s=0.0,
+        way=FollowerMotion(0.0, 0.0, 0.0, 0.0),
+    )
+
+
+@kernel
+def _scored(
+    learned: LearnedProcess,
+    bank: Rows[Member],
+    measurement: Measurement,
+    belief: Gaussian,
+    rules: ProcessLearning,
+    estimator: Filter,
+) -> LearnedProcess:
+    """Score every member by what was put together, and take the noise that is likeliest then."""
+    many = 1.0 * learned.count
+    x, y, due_ns = learned.x / many, learned.y / many, learned.ended_ns + learned.later_ns // learned.count
+    given = measurement.spread
+    spread = Spread(given.xx / many, given.xy / many, given.yy / many)
+    dt = (due_ns - learned.at_ns) * _NS
+    motion = _way_of(learned, measurement, dt)
+    kept, found = math.exp(-dt / FORGOTTEN), learned_noise(learned, rules)
+    tried = rules.turn * TURN_LOWEST
+    for k in range(TURN_MEMBERS):
+        _score(bank, k, Trial(found._replace(q_u=tried), dt, kept, x, y, spread), motion, belief, estimator)
+        tried = tried * TURN_RATIO
+    tried = rules.speed * SPEED_LOWEST
+    for k in range(TURN_MEMBERS, MEMBERS):
+        _score(bank, k, Trial(found._replace(q_v=tried), dt, kept, x, y, spread), motion, belief, estimator)
+        tried = tried * SPEED_RATIO
+    speed = _taken(bank, rules.told.q_v / rules.speed, learned.speed, dt, False)
+    turn = _taken(bank, rules.told.q_u / rules.turn, learned.turn, dt, True)
+    return learned._replace(
+        speed=speed,
+        turn=turn,
+        at_ns=due_ns,
+        ended_ns=measurement.capture_ns,
+        motion=measurement.motion,
+        count=0,
+        later_ns=0,
+        x=0.0,
+        y=0.0,
+        way_s=0.0,
+        way=FollowerMotion(0.0, 0.0, 0.0, 0.0),
+    )
+
+
+@kernel(inline=False)
+def _score(
+    bank: Rows[Member], k: int, trial: Trial, motion: FollowerMotion, belief: Gaussian, estimator: Filter
+) -> None:
+    """Move a member on to a measurement, score it by that, and let it take it in."""
+    member, spread = load(Member, bank, k), trial.spread
+    one = estimator._replace(kind=EKF, noise=trial.noise)
+    prior = one.predict(member.belief, trial.dt, motion)
+    nis = nis_of(prior, trial.x, trial.y, spread)
+    a, b, c = prior.x_x + spread.xx, prior.x_y + spread.xy, prior.y_y + spread.yy
+    score = trial.kept * member.score - 0.5 * (min(nis, _LARGEST_NIS) + math.log(a * c - b * b))
+    if nis <= _LARGEST_NIS:
+        store(bank, k, Member(informed(prior, trial.x, trial.y, spread), score))
+    else:
+        store(bank, k, Member(belief, score))
+
+
+@kernel
+def _taken(bank: Rows[Member], told: float, before: float, dt: float, turn: bool) -> float:
+    """Ratio to the told bandwidth to go on with: the likeliest, but no faster down than leaders may calm."""
+    first, count, lowest, ratio = TURN_MEMBERS, SPEED_MEMBERS, SPEED_LOWEST, SPEED_RATIO
+    falling = _SPEED_FALLING
+    if turn:
+        first, count, lowest, ratio = 0, TURN_MEMBERS, TURN_LOWEST, TURN_RATIO
+        falling = _TURN_FALLING
+    lowest, step = math.log(lowest / told), math.log(ratio)
+    best, highest = 0, _posterior(bank, first, lowest)
+    for k in range(1, count):
+        here = _posterior(bank, first + k, lowest + step * k)
+        if here > highest:
+            best, highest = k, here
+    off = lowest + step * best
+    if 0 < best < count - 1:
+        below = highest - _posterior(bank, first + best - 1, off - step)
+        above = highest - _posterior(bank, first + best + 1, off + step)
+        off += _vertex(below, above, step)
+    return max(SHARE * math.exp(off), before * math.exp(-falling * dt))
+
+
+@kernel
+def _posterior(bank: Rows[Member], k: int, off: float) -> float:
+    """Score of a member with what is told: its logarithm is off by this much from the told one."""
+    apart = off / _TOLD_SD
+    return load(Member, bank, k).score - math.log(1.0 + 0.5 * apart * apart)
+
+
+@kernel
+def _vertex(below: float, above: float, step: float) -> float:
+    """Where K (y + exp(-y)) is highest, off the middle of three members, the others being lower by these."""
+    growth, decay = math.exp(step) - 1.0, 1.0 - math.exp(-step)
+    scale = above * growth + below * decay
+    if scale <= 0.0:
+        return 0.0
+    return max(-0.5 * step, min(0.5 * step, math.log(step * (below + above) / scale)))

@@ -1,0 +1,96 @@
+"""What the limits of a leader say of its motion all along, where measurements say little.
+
+Speed and turn rate of a random walk wander off beyond all limits. A leader of which v_eps, k_v and k_u are
+known has turn rates of mean 0 and variance k_u^2 / 3, and drives at a speed between v_eps and k_v. This is
+told to the belief over and over, with the density that holds a variance, driven by q, at the known one s^2:
+of P' = q - P^2 / r with r = s^4 / q, s^2 is the rest point. Where measurements hold the variance far below
+it, the limits have next to no weight; over a gap, or for what nobody sees, they are all there is.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from estimation.filters.gaussian import Gaussian
+from estimation.models.coordinated_turn import LeaderLimits, ProcessNoise
+from formation.kernel import kernel
+
+
+class _Column(NamedTuple):
+    """Covariance of a quantity with the state."""
+
+    x: float
+    y: float
+    vx: float
+    vy: float
+    u: float
+
+
+@kernel
+def standing_noise(b: Gaussian, noise: ProcessNoise) -> ProcessNoise:
+    """Noise of a leader that may be standing, as far as that is known.
+
+    It sets off with up to q_start while its velocity is known to be below v_eps. A velocity of zero that is
+    known to worse than that is no standing leader, and what it may do next is in its variance already.
+    """
+    floor = noise.v_eps * noise.v_eps
+    return noise._replace(q_start=noise.q_start * max(0.0, 1.0 - (b.vx_vx + b.vy_vy) / floor))
+
+
+@kernel(inline=False)
+def within_limits(b: Gaussian, dt: float, noise: ProcessNoise, limits: LeaderLimits) -> Gaussian:
+    """Belief to which the leader's limits are told for dt [s]."""
+    if dt <= 0.0:
+        return b
+    turn = limits.k_u * limits.k_u * (1.0 / 3.0)
+    b = _told(b, _Column(b.x_u, b.y_u, b.vx_u, b.vy_u, b.u_u), b.u_u, -b.u, turn * turn / (noise.q_u * dt))
+    speed, least = math.sqrt(b.vx * b.vx + b.vy * b.vy), limits.v_eps
+    if speed <= least or limits.k_v <= least:
+        return b
+    c, s = b.vx / speed, b.vy / speed
+    along = _Column(
+        c * b.x_vx + s * b.x_vy,
+        c * b.y_vx + s * b.y_vy,
+        c * b.vx_vx + s * b.vx_vy,
+        c * b.vx_vy + s * b.vy_vy,
+        c * b.vx_u + s * b.vy_u,
+    )
+    # A speed says the more of a velocity the better its direction is known.
+    across = c * c * b.vy_vy - 2.0 * c * s * b.vx_vy + s * s * b.vx_vx
+    weight = 1.0 - across / (speed * speed)
+    if weight <= 0.0:
+        return b
+    span = limits.k_v - least
+    known, middle = span * span * (1.0 / 12.0), 0.5 * (limits.k_v + least)
+    variance = known * known / (weight * weight * noise.q_v * dt)
+    return _told(b, along, c * along.vx + s * along.vy, middle - speed, variance)
+
+
+@kernel
+def _told(b: Gaussian, p: _Column, own: float, residual: float, variance: float) -> Gaussian:
+    """Belief after one number, of the column ``p`` and variance ``own``, was told with a variance."""
+    by = 1.0 / (own + variance)
+    kx, ky, kvx, kvy, ku = by * p.x, by * p.y, by * p.vx, by * p.vy, by * p.u
+    return b._replace(
+        x=b.x + kx * residual,
+        y=b.y + ky * residual,
+        vx=b.vx + kvx * residual,
+        vy=b.vy + kvy * residual,
+        u=b.u + ku * residual,
+        x_x=b.x_x - kx * p.x,
+        x_y=b.x_y - kx * p.y,
+        x_vx=b.x_vx - kx * p.vx,
+        x_vy=b.x_vy - kx * p.vy,
+        x_u=b.x_u - kx * p.u,
+        y_y=b.y_y - ky * p.y,
+        y_vx=b.y_vx - ky * p.vx,
+        y_vy=b.y_vy - ky * p.vy,
+        y_u=b.y_u - ky * p.u,
+        vx_vx=b.vx_vx - kvx * p.vx,
+        vx_vy=b.vx_vy - kvx * p.vy,
+        vx_u=b.vx_u - kvx * p.u,
+        vy_vy=b.vy_vy - kvy * p.vy,
+        vy_u=b.vy_u - kvy * p.u,
+        u_u=b.u_u - ku * p.u,
+    )

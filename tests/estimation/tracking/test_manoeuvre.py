@@ -1,0 +1,122 @@
+"""A leader that changes its motion at once is noticed by its innovations, and outliers are not it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from estimation.filters.gaussian import Gaussian
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, Spread
+from estimation.models.measurement import Measurement, PoseNoise, measure_world
+from estimation.tracking.manoeuvre import (
+    ALARM,
+    LARGEST_SHARE,
+    LASTS,
+    REMEMBERED,
+    SPEED_JUMPY,
+    TURN_JUMPY,
+    Manoeuvre,
+    later,
+    noticed,
+    raised,
+    steady,
+)
+from formation.pose import Pose
+
+LIMITS = LeaderLimits(v_eps=0.04, k_v=0.1, k_u=0.7)
+NOISE = ProcessNoise.by_rule(LIMITS, 0.1, 1e-4)
+SD, FRAME = 1e-3, 1.0 / 120.0
+angles = st.floats(-math.pi, math.pi)
+
+
+def prior(heading: float, speed: float = 0.08) -> Gaussian:
+    """Predicted at the origin, so well known that what is seen elsewhere is all noise or news."""
+    mean = np.array([0.0, 0.0, speed * math.cos(heading), speed * math.sin(heading), 0.0])
+    return Gaussian.of(mean, np.diag([1e-12, 1e-12, 1e-8, 1e-8, 1e-2]))
+
+
+def seen(heading: float, along: float, across: float) -> Measurement:
+    """So many standard deviations ahead and to the left."""
+    c, s = math.cos(heading), math.sin(heading)
+    place = SD * (c * along - s * across), SD * (s * along + c * across)
+    still = FollowerMotion(0.0, 0.0, 0.0, 0.0)
+    return measure_world(0, place, Pose(1.0, 1.0, 0.0), PoseNoise(SD, 0.01), still)
+
+
+def after(innovations: list[tuple[float, float]], heading: float = 0.3) -> tuple[Manoeuvre, Gaussian]:
+    manoeuvre, belief = steady(), prior(heading)
+    for along, across in innovations:
+        manoeuvre = later(manoeuvre, FRAME)
+        manoeuvre, belief = noticed(manoeuvre, prior(heading), seen(heading, along, across), NOISE, LIMITS)
+    return manoeuvre, belief
+
+
+@given(angles, st.sampled_from([-1.0, 1.0]))
+def test_a_run_along_raises_the_noise_of_the_speed_and_one_across_that_of_the_turning(
+    heading: float, side: float
+) -> None:
+    along, wider = after([(2.0 * side, 0.0)] * 7, heading)
+    assert (along.speed_raised, along.speed_jumps, along.turn_raised) == (LASTS, 0.5, 0.0)
+    across, same = after([(0.0, 2.0 * side)] * 7, heading)
+    assert (across.turn_raised, across.turn_jumps, across.speed_raised) == (LASTS, 0.5, 0.0)
+    assert same == prior(heading)
+    noise = raised(NOISE, along, LIMITS)
+    assert noise.q_v > 100.0 * NOISE.q_v
+    assert noise.q_u == NOISE.q_u
+    assert raised(NOISE, across, LIMITS).q_u > 5.0 * NOISE.q_u
+    ahead = np.array([math.cos(heading), math.sin(heading)])
+    grown = wider.covariance[2:4, 2:4] - prior(heading).covariance[2:4, 2:4]
+    assert grown @ np.array([-ahead[1], ahead[0]]) == pytest.approx(np.zeros(2), abs=1e-12)
+    assert ahead @ grown @ ahead > 0.0
+
+
+def test_outliers_alone_are_no_manoeuvre() -> None:
+    """Not two in a row, however large, nor one now and then."""
+    assert 2.0 * (LARGEST_SHARE - 0.5) < ALARM
+    for outliers in ([(1e6, 1e6)] * 2, [(1e6, -1e6), *[(0.0, 0.0)] * 5] * 20):
+        manoeuvre, _ = after(outliers)
+        assert (manoeuvre.speed_jumps, manoeuvre.turn_jumps) == (0.0, 0.0)
+
+
+def test_noise_hardly_ever_makes_an_alarm() -> None:
+    generator, count = np.random.default_rng(5), 0
+    manoeuvre, n = steady(), 20_000
+    for along, across in generator.standard_normal((n, 2)).tolist():
+        manoeuvre = later(manoeuvre, FRAME)._replace(speed_jumps=0.0, turn_jumps=0.0)
+        manoeuvre, _ = noticed(manoeuvre, prior(0.3), seen(0.3, along, across), NOISE, LIMITS)
+        count += (manoeuvre.speed_jumps > 0.0) + (manoeuvre.turn_jumps > 0.0)
+    assert 0 < count < n / 500
+
+
+def test_what_is_raised_falls_back_and_that_a_leader_jumps_is_forgotten_slowly() -> None:
+    manoeuvre, _ = after([(2.0, 2.0)] * 7)
+    soon, late = later(manoeuvre, 1.5 * LASTS), later(manoeuvre, REMEMBERED)
+    assert (soon.speed_raised, soon.turn_raised) == (0.0, 0.0)
+    jumpy = ProcessNoise.by_rule(LIMITS, 0.5 * TURN_JUMPY, 0.25 * SPEED_JUMPY)
+    assert raised(NOISE, soon, LIMITS).q_v == pytest.approx(jumpy.q_v, rel=0.02)
+    assert raised(NOISE, soon, LIMITS).q_u == pytest.approx(jumpy.q_u, rel=0.02)
+    assert raised(NOISE, late, LIMITS) == NOISE
+    assert raised(NOISE, steady(), LIMITS) == NOISE
+
+
+def test_a_leader_that_stands_has_no_direction_to_tell_a_run_by() -> None:
+    started = Manoeuvre(7.0, 7.0, 7.0, 7.0, 0.1, 0.0, 0.0, 0.0, 0.0)
+    for speed in (0.0, 0.4 * LIMITS.v_eps):
+        found, belief = noticed(started, prior(0.3, speed), seen(0.3, 3.0, 3.0), NOISE, LIMITS)
+        assert (found.ahead, found.behind, found.left, found.right) == (0.0, 0.0, 0.0, 0.0)
+        assert belief == prior(0.3, speed)
+
+
+def test_an_innovation_counts_by_the_spread_in_its_direction() -> None:
+    """Along the long axis of a spread ten times as wide three deviations are a third of one."""
+    wide = seen(0.0, 3.0, 0.0)._replace(spread=Spread(100.0 * SD * SD, 0.0, SD * SD))
+    found, _ = noticed(steady(), prior(0.0), wide, NOISE, LIMITS)
+    assert found.ahead == 0.0
+    narrow = wide._replace(spread=Spread(SD * SD, 0.0, 100.0 * SD * SD))
+    assert noticed(steady(), prior(0.0), narrow, NOISE, LIMITS).manoeuvre.ahead == pytest.approx(
+        2.5, abs=1e-4
+    )

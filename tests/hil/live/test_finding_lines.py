@@ -1,0 +1,40 @@
+"""A terminal says once that something is found, and once that it is no more."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from hil.live.finding_lines import FindingLines
+from hil.nodes.findings import advice_on, named_findings
+from hil.nodes.node import diagnostics
+from hil.wire.messages import encode
+
+SILENT = {"odometry_silent": "no odometry for 1.2 s"}
+
+
+def report(node: str, findings: Mapping[str, str]) -> bytes:
+    return encode(diagnostics(node, 0, "", {"status": "tracking", **named_findings(findings)}))
+
+
+def test_a_finding_is_said_when_it_begins_and_when_it_ends() -> None:
+    said: list[str] = []
+    lines = FindingLines(said.append)
+    lines.hear(report("estimator", {}))
+    assert said == []
+    lines.hear(report("estimator", SILENT))
+    lines.hear(report("estimator", {"odometry_silent": "no odometry for 1.7 s"}))
+    begun = f"estimator finds odometry_silent: no odometry for 1.2 s; {advice_on('odometry_silent')}"
+    assert said == [begun]
+    lines.hear(report("controller", {}))
+    assert said == [begun]
+    lines.hear(report("estimator", {}))
+    assert said == [begun, "estimator finds odometry_silent no more"]
+    lines.hear(report("estimator", SILENT))
+    assert said[2:] == [begun]
+
+
+def test_what_cannot_be_read_is_passed_over() -> None:
+    said: list[str] = []
+    lines = FindingLines(said.append)
+    lines.hear(b"finding.")
+    assert said == []

@@ -1,0 +1,36 @@
+"""A finding goes from a node's diagnostics to whoever reads them, with what to do about it."""
+
+from __future__ import annotations
+
+from hil.nodes.findings import (
+    ADVICE,
+    advice_on,
+    all_found,
+    finding_line,
+    findings_in,
+    findings_json,
+    named_findings,
+)
+from hil.nodes.node import diagnostics
+
+SILENT = {"odometry_silent": "no odometry for 1.2 s, expected 30 a second"}
+
+
+def test_findings_come_out_of_diagnostics_as_they_went_in() -> None:
+    report = diagnostics("estimator", 5, "", {"status": "tracking", **named_findings(SILENT)})
+    assert findings_in(report) == {"estimator": SILENT}
+    assert findings_in(diagnostics("controller", 5, "", {"finding.": "of no name"})) == {"controller": {}}
+
+
+def test_all_that_was_ever_found_is_kept_in_its_last_words() -> None:
+    later = {"odometry_silent": "no odometry for 9 s, expected 30 a second"}
+    reports = [{"a": SILENT, "b": {}}, {"a": {}}, {"a": later, "b": {"clock": "behind"}}, {"a": {}}]
+    assert all_found(reports) == {"a": later, "b": {"clock": "behind"}}
+
+
+def test_every_finding_has_an_advice_in_one_line() -> None:
+    (found,) = findings_json(SILENT)
+    assert found == {"name": "odometry_silent", "text": SILENT["odometry_silent"], "advice": found["advice"]}
+    assert finding_line(found) == f"odometry_silent: {found['text']}; {ADVICE['odometry_silent']}"
+    assert advice_on("never heard of").startswith("look at")
+    assert not [advice for advice in ADVICE.values() if "\n" in advice or not advice.strip()]

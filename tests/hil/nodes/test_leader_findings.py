@@ -1,0 +1,56 @@
+"""A run in which the leader turns back says so, and ends confidence; it is judged by the way it travels."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation.tracking.tracker import Status
+from estimation.tracking.travel_watch import NO_TRAVEL
+from hil.judge.columns import columns_of, inside
+from hil.judge.estimation import errors_at
+from hil.judge.run_data import Span, run_data_of_log
+from hil.judge.summary import summarise
+from hil.lockstep.run import run_lockstep
+from hil.log.reader import read_log
+from hil.nodes.leader_findings import leader_findings
+from hil.scenario.files import load_scenario
+
+SECOND_NS = 1_000_000_000
+
+
+def test_a_leader_that_turned_back_is_spoken_of_for_a_while() -> None:
+    assert not leader_findings(NO_TRAVEL, 0)
+    turned = NO_TRAVEL._replace(turned_ns=10 * SECOND_NS)
+    assert "direction of travel" in leader_findings(turned, 11 * SECOND_NS)["cusp"]
+    assert not leader_findings(turned, 13 * SECOND_NS)
+
+
+@pytest.mark.parametrize("takes_s", [0.01, 1.0])
+def test_a_cusp_ends_confidence_and_is_named(takes_s: float, tmp_path: Path) -> None:
+    table = f"t=[0.0, 3.0, {3.0 + takes_s}, 9.0], v=[-0.1, -0.1, 0.1, 0.1], u=[0.2, 0.2, 0.2, 0.2]"
+    scenario = load_scenario(
+        "turtlebot3",
+        [f'leader.program={{kind="table", {table}}}', "run.duration_s=6.0", "run.evaluate_from_s=1.0"],
+    )
+    run_lockstep(scenario, tmp_path / "run.mcap")
+    run_data = run_data_of_log(read_log(tmp_path / "run.mcap"))
+    summary, columns = summarise(run_data), columns_of(run_data)
+    assert "cusp" in [each["name"] for each in summary["findings"]]
+    # The truth is that of the direction of travel, and so are the estimates, before and after.
+    assert np.all(columns.truth.v1 >= 0.0)
+    assert summary["estimation"]["rmse"]["alpha1"] < 0.15
+    assert summary["estimation"]["rmse"]["v1"] < 0.01
+    assert "orbit_deviation_rms" not in summary["formation"]
+    estimates = columns.estimates
+    begun = run_data.zero_ns + 3 * SECOND_NS
+    turning = inside(estimates.capture_ns, Span(begun, begun + SECOND_NS + round(takes_s * 1e9)))
+    assert np.any(turning & (estimates.status != Status.TRACKING))
+    wrong = np.abs(errors_at(estimates, columns.truth.at(estimates.capture_ns))["alpha1"]) > 0.5 * math.pi
+    assert not np.any(turning & wrong & (estimates.status == Status.TRACKING))
+    slow = estimates.seen.v1 < scenario.leader.v_eps
+    assert np.any(turning & slow)
+    assert np.all(estimates.sd[slow, 3] >= math.pi / math.sqrt(3.0) - 1e-12)
