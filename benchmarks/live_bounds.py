@@ -5,8 +5,8 @@
 Tracks of 2000 frames go through the very step that flies. Leaders accelerate by k_v k_u, to and fro; each
 axis of every measured position errs by three standard deviations, its signs switched by chance, in square
 waves of all periods, or by the impulse response of the filter turned round in time, which is the pattern that
-leads it furthest astray. Of the tracking rows: how many errors exceed their bounds, the largest error / bound,
-medians of the bounds, and how many of alpha1 exclude anything.
+leads it furthest astray. Of the tracking rows: how many errors exceed their bounds, the largest error over
+its bound, medians of the bounds, and how many of alpha1 exclude anything.
 """
 
 from __future__ import annotations
