@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from estimation.calibration.sensor_bias import Offset, SensorBias
-from hil.lockstep.run import run_lockstep
-from hil.log.metadata import scenario_of
+from hil.lockstep.run import Prepared, make_nodes, run_lockstep
+from hil.log.metadata import log_metadata, scenario_of
 from hil.log.reader import Log, read_log
 from hil.log.writer import LogWriter
 from hil.replay.lab_calibration import calibration_of
@@ -23,7 +23,9 @@ TRUE = {"mocap.sigma_position": 1e-3, "mocap.sigma_heading": 7e-3}
 @pytest.fixture(scope="module")
 def noisy_log(tmp_path_factory: pytest.TempPathFactory) -> Log:
     path = tmp_path_factory.mktemp("noise") / "run.mcap"
-    run_lockstep(load_scenario("turtlebot3", {**TRUE, "run.duration_s": 8.0, "mocap.rate_hz": 60.0}), path)
+    scenario = load_scenario("turtlebot3", {**TRUE, "run.duration_s": 8.0, "mocap.rate_hz": 60.0})
+    # No certificate is asked for, which takes longer than the run where nothing is compiled.
+    run_lockstep(scenario, path, Prepared(make_nodes(scenario), log_metadata(scenario, "lockstep")))
     return read_log(path)
 
 
