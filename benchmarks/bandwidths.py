@@ -27,6 +27,7 @@ from benchmarks.random_leaders import random_leader
 from estimation.consistency.process_estimate import MEMBERS, Member
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import Measurement, PoseNoise, measure_body, measure_world
+from estimation.own_motion.odometry_check import WayEntry
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.own_motion.own_track import OwnPoint
 from estimation.tracking.estimate import Estimate
@@ -159,12 +160,13 @@ def followed(
     points: Rows[TrackPoint],
     history: Rows[MotionSample],
     own: Rows[OwnPoint],
+    ways: Rows[WayEntry],
     bank: Rows[Member],
     seen: Rows[Measurement],
     estimates: Rows[Estimate],
 ) -> int:
     """Take measurements in as a node does; an estimate for each."""
-    memory = Memory(borrowed(points), borrowed(history), borrowed(own), borrowed(bank))
+    memory = Memory(borrowed(points), borrowed(history), borrowed(own), borrowed(ways), borrowed(bank))
     fixed, known = load(Rules, rules, 0), load(Known, knowns, 0)
     for k in range(size(seen)):
         measurement = load(Measurement, seen, k)
@@ -235,6 +237,7 @@ def scored(rules: Rules, seen: Rows[Measurement], path: Driven, since: float) ->
         rows_of(TrackPoint, _ROOM),
         rows_of(MotionSample, 2),
         rows_of(OwnPoint, 2),
+        rows_of(WayEntry, 2),
         rows_of(Member, MEMBERS),
         seen,
         estimates,

@@ -110,7 +110,8 @@ NOTHING_LEARNED = LearnedProcess(1.0, 1.0, 0, False, 0, 0, FollowerMotion(0.0, 0
 @kernel
 def learned_noise(learned: LearnedProcess, rules: ProcessLearning) -> ProcessNoise:
     """Process noise to take."""
-    return rules.told._replace(q_v=rules.told.q_v * learned.speed, q_u=rules.told.q_u * learned.turn)
+    told = rules.told
+    return told._replace(q_v=told.q_v * learned.speed, q_u=told.q_u * learned.turn, q_across=told.q_v)
 
 
 @kernel(inline=False)

@@ -7,6 +7,7 @@ matrices there and the filters are made of them.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from formation.arc import Swing
@@ -27,13 +28,15 @@ class ProcessNoise(NamedTuple):
     ``q_v`` [m^2/s^3] drives the speed, ``q_u`` [rad^2/s^3] the turn rate. ``v_eps`` [m/s] is the speed below
     which the direction of motion is not trusted, so that the noise of w becomes isotropic. A leader slower
     than that stands or sets off, which the model of steady driving knows nothing of: there w is driven by up
-    to ``q_start`` [m^2/s^3] more.
+    to ``q_start`` [m^2/s^3] more. ``q_across`` [m^2/s^3] is the most that is isotropic otherwise: jumps of
+    the speed say nothing of the direction.
     """
 
     q_v: float
     q_u: float
     v_eps: float
     q_start: float = 0.0
+    q_across: float = math.inf
 
     @staticmethod
     def by_rule(limits: LeaderLimits, turn_bandwidth: float, speed_bandwidth: float = 0.01) -> ProcessNoise:
@@ -122,7 +125,8 @@ def acceleration(vx: float, vy: float, noise: ProcessNoise) -> Spread:
     squared, floor = vx * vx + vy * vy, noise.v_eps * noise.v_eps
     weight = noise.q_v / (squared + floor)
     start = noise.q_start * max(0.0, 1.0 - squared / floor)
-    return Spread(weight * (vx * vx + floor) + start, weight * vx * vy, weight * (vy * vy + floor) + start)
+    even = floor if noise.q_v <= noise.q_across else floor * (noise.q_across / noise.q_v)
+    return Spread(weight * (vx * vx + even) + start, weight * vx * vy, weight * (vy * vy + even) + start)
 
 
 @kernel

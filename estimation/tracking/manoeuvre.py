@@ -21,7 +21,7 @@ LARGEST_SHARE = 3.0
 """Standard deviations that an innovation counts for at most: two gated outliers in a row are no run."""
 
 ALARM = 9.0
-"""Logarithm [nat] of how much likelier a run must be than chance: one in many thousand innovations is false."""
+"""Logarithm [nat] of how much likelier a run must be than chance, which brings it in 10,000 innovations."""
 
 LASTS = 0.15
 """How long [s] the noise stays raised after an alarm: about as long as a robot's actuators take."""
@@ -89,7 +89,9 @@ def later(manoeuvre: Manoeuvre, dt: float) -> Manoeuvre:
 @kernel
 def raised(noise: ProcessNoise, manoeuvre: Manoeuvre, limits: LeaderLimits) -> ProcessNoise:
     """Process noise of a leader that makes jumps, or just now seems to."""
-    speed, turn = SPEED_JUMPY * manoeuvre.speed_jumps, TURN_JUMPY * manoeuvre.turn_jumps
+    # Squared, since speed noise that a false alarm leaves behind costs more than that of turning.
+    sure = manoeuvre.speed_jumps * manoeuvre.speed_jumps
+    speed, turn = SPEED_JUMPY * sure, TURN_JUMPY * manoeuvre.turn_jumps
     if manoeuvre.speed_raised > 0.0:
         speed = SPEED_RAISED
     if manoeuvre.turn_raised > 0.0:

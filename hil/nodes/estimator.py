@@ -16,6 +16,7 @@ from estimation.own_motion.odometry_correction import (
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.time.host_time import HostTime
 from estimation.tracking.estimate import Estimate
+from estimation.tracking.mount_check import is_off
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE
 from formation.records import load
 from hil.nodes.certifying import Believed, certifying
@@ -29,6 +30,7 @@ from hil.nodes.mount_report import mount_findings, mount_problem, mount_report
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
 from hil.nodes.noise_report import is_refuted, noise_findings, noise_report, scale_of
 from hil.nodes.odometry_findings import odometry_findings
+from hil.nodes.process_report import process_report
 from hil.nodes.sensor_offsets import offsets_report
 from hil.scenario.files import refuse_unrunnable
 from hil.scenario.schema import Scenario
@@ -225,8 +227,11 @@ class EstimatorNode:
         """Diagnostics: status of the track, inputs taken and refused."""
         known = state.memory.known
         problem = "" if is_under_way(known, self.rules.step) else self._missing(known)
-        problem = problem or mount_problem(known.mount_check, stops=self.rules.step.mounts.stops)
+        stops = self.rules.step.mounts.stops
+        problem = problem or mount_problem(known.mount_check, stops=stops)
         values: dict[str, object] = {"status": state.memory.status(now_ns).name.lower()}
+        if stops and values["status"] == "tracking" and is_off(known.mount_check):
+            values["status"] = "rejecting"
         values |= mount_report(known.mount_check)
         values |= clock_report(state.times, state.memory.desk.time)
         values |= (
@@ -235,6 +240,7 @@ class EstimatorNode:
             else {}
         )
         values |= noise_report(known.noise, self.rules.step.noise_learning)
+        values |= process_report(known.process, self.rules.step.process_learning)
         if self.aligns:
             applied = state.comparison.applied._asdict()
             values |= {f"odometry.{name}": value for name, value in applied.items()}
@@ -248,9 +254,9 @@ class EstimatorNode:
         A replay in one pass asks too, and has loaded none of the node's own steps.
         """
         known, rules = state.memory.known, self.rules.step
-        found = mount_findings(known.mount_check) | odometry_findings(known, rules, now_ns)
+        found = {**mount_findings(known.mount_check), **odometry_findings(known, rules, now_ns)}
         found |= noise_findings(known.noise, rules.noise_learning)
-        return found | leader_findings(known.travel, now_ns)
+        return {**found, **leader_findings(known.travel, now_ns)}
 
     def _missing(self, known: Known) -> str:
         """What the estimator waits for to begin."""

@@ -456,7 +456,10 @@ def take_odometry(known: Known, memory: Memory, rules: Rules, told: OdometrySamp
         check = with_sample(check, memory.ways, told, rules.own_noise)
         known = known._replace(odometry_check=check)
         if known.own.length > 0:
-            known = known._replace(odometry_check=_judged(known, memory, rules))
+            seen = rules
+            if rules.noise_learning.learns:
+                seen = with_noise(rules, scaled_noise(rules.noise, known.noise))
+            known = known._replace(odometry_check=_judged(known, memory, seen))
     ring = remember(memory.history, known.odometry, sample, rules.span)
     known = known._replace(odometry=ring)
     n = known.track.length

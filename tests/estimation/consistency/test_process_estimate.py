@@ -24,9 +24,11 @@ from estimation.consistency.process_estimate import (
 )
 from estimation.filters.belief import Model
 from estimation.filters.filter import Filter, Kind, filter_of
+from estimation.filters.gaussian import Gaussian
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, Measurement, PoseNoise, measure_world
 from estimation.models.motion import Vector
+from estimation.tracking.track_point import TrackPoint, begun
 from formation.pose import Pose
 from formation.records import Rows, load, rows_of
 
@@ -50,6 +52,11 @@ def sighted(generator: np.random.Generator, k: int, state: Vector) -> Measuremen
     return measure_world(capture_ns, (float(x), float(y)), Pose(0.0, -1.0, 0.0), PoseNoise(SD, 0.01), STILL)
 
 
+def point(measurement: Measurement, belief: Gaussian, estimator: Filter) -> TrackPoint:
+    """Of a track that is settled."""
+    return begun(measurement, estimator)._replace(belief=belief, settled=True)
+
+
 def found_for(
     turn: float, speed: float, rules: ProcessLearning, seconds: float = 20.0, seed: int = 1
 ) -> tuple[LearnedProcess, Rows[Member]]:
@@ -64,7 +71,7 @@ def found_for(
         measurement = sighted(generator, k + 1, state)
         noise = learned_noise(learned, rules)
         belief = estimator.driven_by(noise).step(belief, STEP, STILL, measurement, math.inf).belief
-        learned = learn(learned, bank, measurement, belief, True, rules, estimator)
+        learned = learn(learned, bank, point(measurement, belief, estimator), rules, estimator)
     return learned, bank
 
 
@@ -78,7 +85,8 @@ def test_the_bandwidths_of_a_leader_are_found_whatever_is_told(
     noise = learned_noise(learned, rules)
     assert 1.0 / 2.5 < noise.q_u / (SHARE * turn * rules.turn) < 2.5
     assert 1.0 / 2.5 < noise.q_v / (SHARE * speed * rules.speed) < 2.5
-    assert noise._replace(q_v=0.0, q_u=0.0) == rules.told._replace(q_v=0.0, q_u=0.0)
+    kept = noise._replace(q_v=0.0, q_u=0.0, q_across=math.inf)
+    assert kept == rules.told._replace(q_v=0.0, q_u=0.0)
 
 
 def test_before_the_track_has_settled_it_is_as_told() -> None:
@@ -86,9 +94,9 @@ def test_before_the_track_has_settled_it_is_as_told() -> None:
     estimator, bank, learned = main_filter(rules), rows_of(Member, MEMBERS), NOTHING_LEARNED
     for k in range(40):
         measurement = sighted(generator, k, np.zeros(5))
-        learned = learn(learned, bank, measurement, estimator.start(measurement), False, rules, estimator)
+        learned = learn(learned, bank, begun(measurement, estimator), rules, estimator)
     assert learned == NOTHING_LEARNED
-    assert learned_noise(learned, rules) == rules.told
+    assert learned_noise(learned, rules) == rules.told._replace(q_across=rules.told.q_v)
 
 
 def test_a_new_track_starts_the_bank_anew_and_keeps_what_was_learned() -> None:
@@ -103,8 +111,8 @@ def test_a_new_track_starts_the_bank_anew_and_keeps_what_was_learned() -> None:
     while not again.begun:
         assert (k - 1000) * STEP < 0.6
         measurement = sighted(generator, k, there)
-        belief = estimator.start(measurement)
-        again = learn(again, bank, measurement, belief, True, rules, estimator)
+        here = point(measurement, estimator.start(measurement), estimator)
+        again = learn(again, bank, here, rules, estimator)
         k += 1
     assert [load(Member, bank, k).score for k in range(MEMBERS)] == scores
     assert load(Member, bank, 3).belief.x == pytest.approx(5.0, abs=0.1)
