@@ -10,6 +10,7 @@ from estimation.consistency.process_estimate import NOTHING_LEARNED, Member
 from estimation.models.measurement import PairSeen
 from estimation.own_motion.odometry_check import UNCHECKED, OdometrySample, WayEntry, without_track
 from estimation.own_motion.odometry_history import IDEAL, MotionSample
+from estimation.own_motion.odometry_noise import ODOMETRY_AS_TOLD
 from estimation.own_motion.own_track import OwnPoint
 from estimation.time.host_time import NO_TIME_YET, HostTime, TimeRows
 from estimation.tracking.estimate import Estimate
@@ -133,6 +134,7 @@ NOTHING_KNOWN = Known(
     process=NOTHING_LEARNED,
     travel=NO_TRAVEL,
     mount_check=NO_MOUNT_CHECK,
+    odometry_noise=ODOMETRY_AS_TOLD,
 )
 
 

@@ -10,6 +10,7 @@ from estimation.filters.filter import Filter
 from estimation.models.measurement import PoseNoise
 from estimation.own_motion.odometry_check import OdometryCheck, WayEntry
 from estimation.own_motion.odometry_history import Correction, InputTrust, MotionSample
+from estimation.own_motion.odometry_noise import OdometryNoise
 from estimation.own_motion.own_track import OwnNoise, OwnPoint
 from estimation.tracking.estimate import Estimate
 from estimation.tracking.mount_check import MountCheck
@@ -75,6 +76,7 @@ class Known(NamedTuple):
     ``watched_ns``: capture of the first frame since when odometry is missed, 0 before. ``noise``: of
     measurements, as they tell it. ``process``: what is known of how the leader drives. ``travel``: which
     way the leader went, where it is seen in the world. ``mount_check``: what is left of the follower's mount.
+    ``odometry_noise``: what odometry shows to be its errors.
     """
 
     track: Ring
@@ -87,6 +89,7 @@ class Known(NamedTuple):
     process: LearnedProcess
     travel: TravelWatch
     mount_check: MountCheck
+    odometry_noise: OdometryNoise
 
 
 class Taken(NamedTuple):

@@ -80,6 +80,7 @@ from hil.nodes.own_motion_step import (
     is_fresh,
     judged_odometry,
     own_again,
+    with_odometry_noise,
 )
 
 _NS = 1e-9
@@ -265,7 +266,8 @@ def take_odometry(known: Known, memory: Memory, rules: Rules, told: OdometrySamp
     """Take in a sample of odometry, and fold again what came after the sample before it."""
     sample = MotionSample(told.stamp_ns, told.v2, told.u2)
     if rules.source == AUTO:
-        check = known.odometry_check
+        before = known.odometry_check
+        check = before
         if source_of(check) == POSE and told.has_pose and check.last.has_pose:
             sample = by_pose(check.last, told)
         by = known.correction
@@ -273,10 +275,12 @@ def take_odometry(known: Known, memory: Memory, rules: Rules, told: OdometrySamp
         check = with_sample(check, memory.ways, told, rules.own_noise)
         known = known._replace(odometry_check=check)
         if known.own.length > 0:
-            seen = rules
-            if rules.noise_learning.learns:
+            seen, learns = rules, rules.noise_learning.learns
+            if learns:
                 seen = with_noise(rules, scaled_noise(rules.noise, known.noise))
             known = known._replace(odometry_check=judged_odometry(known, memory, seen))
+            if learns and rules.filter.in_world:
+                known = with_odometry_noise(known, before, told, seen)
     ring = remember(memory.history, known.odometry, sample, rules.span)
     known = known._replace(odometry=ring)
     n = known.track.length

@@ -14,6 +14,7 @@ from estimation.own_motion.odometry_check import (
     way_between,
 )
 from estimation.own_motion.odometry_history import InputTrust, MotionSample, follower_motion
+from estimation.own_motion.odometry_noise import noise_with_sample, noise_with_window, with_found_noise
 from estimation.own_motion.own_track import (
     OwnPoint,
     motion_of,
@@ -68,6 +69,7 @@ def _trust(known: Known, rules: Rules) -> InputTrust:
 def _fresh_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
     """Motion by odometry that is believed, as old as it is; by nothing at all if there is none to believe."""
     motion, check = by_odometry(known, memory, rules, capture_ns), known.odometry_check
+    motion = with_found_noise(motion, known.odometry_noise)
     if source_of(check) == TRACK or not check.heard:
         return motion._replace(sd_v2=rules.own_noise.v_max, sd_u2=rules.own_noise.u_max)
     return aged(motion, check, age_of(check, capture_ns, _trust(known, rules)), rules.own_noise)
@@ -112,6 +114,17 @@ def judged_odometry(known: Known, memory: Memory, rules: Rules) -> OdometryCheck
     if not awaits_track(check):
         return check
     return with_own_track(check, memory.ways, memory.own, known.own, rules.own_noise, _trust(known, rules))
+
+
+@kernel
+def with_odometry_noise(known: Known, before: OdometryCheck, told: OdometrySample, rules: Rules) -> Known:
+    """Known with what a sample tells of odometry's noise, and a window that has ended by it."""
+    noise, after = known.odometry_noise, known.odometry_check
+    if before.heard:
+        noise = noise_with_sample(noise, before.last, told, rules.trust, rules.own_noise)
+    if before.windowed and after.windowed and after.since.stamp_ns > before.since.stamp_ns:
+        noise = noise_with_window(noise, before.since, after.since, rules.trust, rules.own_noise)
+    return known._replace(odometry_noise=noise)
 
 
 @kernel
