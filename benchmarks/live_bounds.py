@@ -33,7 +33,7 @@ from formation.records import Matrix, Rows, load, store
 from hil.nodes import estimator_step as step
 from hil.nodes.estimator import EstimatorNode
 from hil.nodes.estimator_desk import Desk, NodeRules, forget
-from hil.nodes.estimator_step import Known
+from hil.nodes.estimator_records import Known
 from hil.scenario.files import load_scenario
 from hil.scenario.leader_model import leader_limits, process_noise
 from hil.scenario.schema import Scenario
