@@ -79,7 +79,7 @@ class _Pairs:
     def choose(self) -> None:
         """Errors on the rim and steering at the limit for the next step."""
         n, random, k_u = len(self.rho), self._random, self.model.k_u
-        places = 2.0 * math.pi / _PLACES * np.arange(_PLACES)
+        places: FloatArray = np.linspace(0.0, 2.0 * math.pi, _PLACES, endpoint=False)
         side = np.where(self.theta >= 0.0, 1.0, -1.0)
         values = side[:, np.newaxis] * self._pull(places[np.newaxis, :])
         worst = places[np.argmax(values, axis=1)]

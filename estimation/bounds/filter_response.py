@@ -114,7 +114,8 @@ def _worst(weights: FloatArray) -> FloatArray:
 
 def _weights(M: Matrix, first: Matrix) -> FloatArray:
     """Impulse responses (n, 4, 2) of position and velocity, until they are forgotten."""
-    weights, now = [], first
+    weights: list[Matrix] = []
+    now = first
     largest = float(np.abs(first).max())
     while len(weights) < _MOST_FRAMES and float(np.abs(now).max()) > _FORGOTTEN * largest:
         weights.append(now[:4])
@@ -125,10 +126,11 @@ def _weights(M: Matrix, first: Matrix) -> FloatArray:
 def _settled_gain(F: Matrix, Q: Matrix, sigma: float) -> Matrix:
     """Gain (5, 2) that the filter's settles to."""
     H, R = np.eye(2, STATE_SIZE), sigma * sigma * np.eye(2)
-    P, gain = np.eye(STATE_SIZE), np.zeros((STATE_SIZE, 2))
+    P: Matrix = np.eye(STATE_SIZE)
+    gain: Matrix = np.zeros((STATE_SIZE, 2))
     for _ in range(_MOST_FRAMES):
         ahead = F @ P @ F.T + Q
-        K = np.linalg.solve(ahead[:2, :2] + R, ahead[:2]).T
+        K: Matrix = np.asarray(np.linalg.solve(ahead[:2, :2] + R, ahead[:2]).T, dtype=np.float64)
         rest = np.eye(STATE_SIZE) - K @ H
         P = rest @ ahead @ rest.T + K @ R @ K.T
         moved = float(np.abs(K - gain).max())

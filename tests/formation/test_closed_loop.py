@@ -248,7 +248,7 @@ def test_once_the_leader_drives_straight_the_error_decays(gains: Gains) -> None:
     times = np.linspace(0.0, 60.0, 601)
     found = simulate_pair(leader, follower, program, with_gains("independent", gains), times)
     straight = times > 20.05
-    value = np.array([lyapunov(found.shape_at(k), gains.spacing) for k in np.flatnonzero(straight)])
+    value = np.array([lyapunov(found.shape_at(k), gains.spacing) for k in np.flatnonzero(straight).tolist()])
     assert np.all(np.diff(value) <= 1e-12)
     off = np.hypot(found.rho / rho_0 - 1.0, found.alpha1 - ABREAST_ALPHA1)
     assert off[times < 20.0].max() > 0.1

@@ -110,6 +110,7 @@ def test_no_noise_and_no_acceleration_within_bounds_does_worse(u1: float) -> Non
         )
         rows = np.kron(np.eye(2 * lags), np.ones(sides))
         solved = linprog(-gains, A_ub=rows, b_ub=np.ones(2 * lags), bounds=(0.0, 1.0))
+        assert solved.fun is not None
         best = max(best, -solved.fun)
     assert 0.93 * found < best <= found
 
