@@ -57,7 +57,7 @@ def figures_of(log: Path, overrides: Sequence[str] = ()) -> list[float]:
     samples, v_eps = columns.samples, scenario.leader.v_eps
     moving = _moving(columns.estimates, columns, v_eps)
     tracked = _moving(samples, columns, v_eps) / max(1, moving)
-    errors, true = errors_at(samples, columns.true), columns.true.v1
+    errors, true = errors_at(samples, columns.true), np.asarray(columns.true.v1)
     known = np.isfinite(true) if len(true) else np.zeros(0, dtype=np.bool_)
     if np.count_nonzero(known) < 10:
         return [np.nan] * 5 + [tracked] + [np.nan] * 4
@@ -69,7 +69,7 @@ def figures_of(log: Path, overrides: Sequence[str] = ()) -> list[float]:
         rmse / float(np.std(true[known])),
         rmse / float(np.std(everywhere)),
         float(np.median(np.abs(alpha1))),
-        float(np.corrcoef(samples.seen.v1[known], true[known])[0, 1]),
+        float(np.corrcoef(np.asarray(samples.seen.v1)[known], true[known])[0, 1]),
         tracked,
         float(np.mean(np.abs(alpha1) > 5.0 * sd_alpha1)),
         float(np.mean((v1 / sd_v1) ** 2)),

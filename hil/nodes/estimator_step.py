@@ -256,7 +256,9 @@ def _learned(known: Known, memory: Memory, rules: Rules, verdict: int) -> Learne
     if verdict != USED:
         return known.process
     point = newest(memory.points, known.track)
-    if point.period > SELDOM:
+    # Where commands stand in for motion, innovations tell how the follower obeys, not how the leader drives.
+    obeys = point.measurement.has_way and rules.trust.lag > 0.0
+    if obeys or point.period > SELDOM:
         return known.process
     return learn(known.process, memory.bank, point, rules.process_learning, rules.filter)
 

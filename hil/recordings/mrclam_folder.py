@@ -101,7 +101,7 @@ def _sightings(folder: Path, leader: int, follower: int) -> Series:
 
     Rows of one stamp are of several subjects, so that the file is read whole and then sifted.
     """
-    codes = {subject: round(code) for subject, code in _numbers(folder / "Barcodes.dat", 2)}
+    codes = {round(subject): round(code) for subject, code in _numbers(folder / "Barcodes.dat", 2)}
     if leader not in codes:
         raise UsageError(
             f"{folder / 'Barcodes.dat'}: has no subject {leader}; expected a bar code of robot {leader}"

@@ -26,8 +26,7 @@ def kept(samples: Sequence[MotionSample]) -> tuple[Rows[MotionSample], Ring]:
 
 def turn_in_between() -> list[MotionSample]:
     """A turn by half a radian between 0.3 and 0.8 s, of which 0 and 1 s know nothing."""
-    turning = lambda ms: 300 <= ms < 800  # noqa: E731
-    return [MotionSample(ms * MS, 0.1, 1.0 if turning(ms) else 0.0) for ms in range(0, 1001, 20)]
+    return [MotionSample(ms * MS, 0.1, 1.0 if 300 <= ms < 800 else 0.0) for ms in range(0, 1001, 20)]
 
 
 def between(samples: Sequence[MotionSample], trust: InputTrust, *ms: int) -> FollowerMotion:
@@ -36,7 +35,7 @@ def between(samples: Sequence[MotionSample], trust: InputTrust, *ms: int) -> Fol
 
 def test_a_turn_between_two_sightings_is_not_lost() -> None:
     found = between(turn_in_between(), TRUST, 0, 1000)
-    assert (found.v2, found.u2) == (pytest.approx(0.1), pytest.approx(0.5, abs=1e-9))
+    assert [found.v2, found.u2] == [pytest.approx(0.1), pytest.approx(0.5, abs=1e-9)]
     assert (found.sd_v2, found.sd_u2) == (TRUST.sd_v2, TRUST.sd_u2)
 
 
@@ -50,14 +49,14 @@ def test_ways_add_up_wherever_they_are_parted() -> None:
 
 def test_outside_of_what_was_heard_the_motion_is_held() -> None:
     found = between([MotionSample(500 * MS, 0.2, -0.3)], TRUST, 0, 2000)
-    assert (found.v2, found.u2) == (pytest.approx(0.2), pytest.approx(-0.3))
+    assert [found.v2, found.u2] == [pytest.approx(0.2), pytest.approx(-0.3)]
 
 
 def test_a_delay_shifts_the_interval_and_scales_scale() -> None:
     late = InputTrust(0.005, 0.03, delay=0.1)
     found = motion_between(*kept(turn_in_between()), (400 * MS, 800 * MS), late, Correction(0.1, 1.1, 0.9))
     whole = between(turn_in_between(), TRUST, 200, 600)
-    assert (found.v2, found.u2) == (pytest.approx(1.1 * whole.v2), pytest.approx(0.9 * whole.u2))
+    assert [found.v2, found.u2] == [pytest.approx(1.1 * whole.v2), pytest.approx(0.9 * whole.u2)]
 
 
 def test_of_a_lag_every_delay_is_as_likely_and_what_they_differ_by_is_told() -> None:
@@ -65,8 +64,8 @@ def test_of_a_lag_every_delay_is_as_likely_and_what_they_differ_by_is_told() -> 
     lagging = InputTrust(0.0, 0.0, lag=0.4)
     before, after = between(step, lagging, 500, 600), between(step, lagging, 1500, 1600)
     amid = between(step, lagging, 1190, 1210)
-    assert (before.u2, before.sd_u2) == (0.0, pytest.approx(0.0, abs=1e-6))
-    assert (after.u2, after.sd_u2) == (pytest.approx(0.8), pytest.approx(0.0, abs=1e-6))
+    assert [before.u2, before.sd_u2] == [0.0, pytest.approx(0.0, abs=1e-6)]
+    assert [after.u2, after.sd_u2] == [pytest.approx(0.8), pytest.approx(0.0, abs=1e-6)]
     assert amid.u2 == pytest.approx(0.4, abs=0.1)
     # Delays of 0, 0.1, .. 0.4 s: half of them say 0.8 rad/s, half say 0.
     assert amid.sd_u2 == pytest.approx(0.38 * math.sqrt(LASTING / ODOMETRY_CORRELATION), rel=0.1)
