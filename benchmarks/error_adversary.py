@@ -31,7 +31,8 @@ from formation.spacing import restoring
 TURTLEBOT3 = ErrorModel(1.5, 0.2, 20.0, 0.08, 0.7, 0.020494)
 STEP = 0.01
 SLACK = 1e-5
-_PLACES = 36
+_PLACES = 24
+_HOLD = 3
 _LOST = 3.0
 
 
@@ -83,7 +84,7 @@ class _Pairs:
         values = side[:, np.newaxis] * self._pull(places[np.newaxis, :])
         worst = places[np.argmax(values, axis=1)]
         hurts = self._cunning & (np.abs(self.theta) >= self._margin)
-        by_chance = (random.random(n) < STEP * self._rate) & ~self._cunning
+        by_chance = (random.random(n) < _HOLD * STEP * self._rate) & ~self._cunning
         drawn = random.uniform(0.0, 2.0 * math.pi, n)
         self.place = np.where(hurts, worst, np.where(by_chance, drawn, self.place))
         self.u1 = np.where(hurts, -side * k_u, np.where(by_chance, -self.u1, self.u1))
@@ -148,7 +149,8 @@ def drive_out(
     excess, reached = np.zeros((2, pairs)), 0.0
     low, high = inside.alpha1_min - ABREAST_ALPHA1, inside.alpha1_max - ABREAST_ALPHA1
     for step in range(round(duration / STEP)):
-        tried.choose()
+        if step % _HOLD == 0:
+            tried.choose()
         if robots is None:
             tried.drive_model()
         else:

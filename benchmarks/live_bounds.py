@@ -2,11 +2,11 @@
 
     python benchmarks/live_bounds.py [--samples 10000000] [--scenario turtlebot3] [--seed 1]
 
-Tracks of 2000 frames go through the very step that flies. Leaders accelerate by k_v k_u, to and fro; each axis
-of every measured position errs by three standard deviations, its signs switched by chance, in square waves of
-all periods, or by the impulse response of the filter turned round in time, which is the pattern that leads it
-furthest astray. Of the tracking rows: how many errors exceed their bounds, the largest error / bound, medians
-of the bounds, and how many of alpha1 exclude anything.
+Tracks of 2000 frames go through the very step that flies. Leaders accelerate by k_v k_u, to and fro; each
+axis of every measured position errs by three standard deviations, its signs switched by chance, in square
+waves of all periods, or by the impulse response of the filter turned round in time, which is the pattern that
+leads it furthest astray. Of the tracking rows: how many errors exceed their bounds, the largest error over
+its bound, medians of the bounds, and how many of alpha1 exclude anything.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from formation.records import Matrix, Rows, load, store
 from hil.nodes import estimator_step as step
 from hil.nodes.estimator import EstimatorNode
 from hil.nodes.estimator_desk import Desk, NodeRules, forget
-from hil.nodes.estimator_step import Known
+from hil.nodes.estimator_records import Known
 from hil.scenario.files import load_scenario
 from hil.scenario.leader_model import leader_limits, process_noise
 from hil.scenario.schema import Scenario
@@ -139,7 +139,7 @@ def main() -> None:
 def judge(
     scenario: Scenario, samples: int, seed: int
 ) -> tuple[int, list[int], list[float], list[FloatArray], float]:
-    """Samples judged; per v1 and alpha1 violations, largest error / bound, bounds (thinned); seconds taken."""
+    """Samples judged; per v1 and alpha1 violations, largest error / bound, every 20th bound; seconds."""
     random = np.random.default_rng(seed)
     adversary, node = Adversary(scenario, random), EstimatorNode(scenario)
     memory = node.begin(0).memory

@@ -20,7 +20,8 @@ class Assumptions:
     speeds that it will really drive, for the formation. Of the law mu1, mu2 [rad/s] and the spacing.
     ``noise``: in words, where eps comes from. ``side`` that the follower drives on. ``unproved``: why the
     theory of the formation does not speak of this pair, empty if it does; ``unknown_steering``: why that of
-    its steering does not.
+    its steering does not. ``filter_error``: largest error of the velocity [m/s] that the filter which flies
+    makes under the same bounds once it has settled, None where that is not known.
     """
 
     eps: float
@@ -36,6 +37,7 @@ class Assumptions:
     side: Side = Side.RIGHT
     unproved: str = ""
     unknown_steering: str = ""
+    filter_error: float | None = None
 
     @property
     def acceleration(self) -> float:

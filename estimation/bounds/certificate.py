@@ -152,13 +152,20 @@ def _nearest(given: Assumptions, held: InvariantSet | None) -> tuple[float, str]
 
 def _estimates(given: Assumptions, velocity_error: float) -> Claim:
     assumes = (*_sources(given), f"v1 >= v_eps = {given.v_eps:g} m/s")
+    figures = {"M_v1": velocity_error}
+    if given.filter_error is not None:
+        figures["M_v1_filter"] = given.filter_error
+        assumes = (
+            *assumes,
+            "M_v1_filter: the extended filter that flies, once settled, at its worst (linearised)",
+        )
     if given.v_eps <= velocity_error:
         why = (
             f"M_alpha1: the velocity's error {velocity_error:.3g} m/s reaches v_eps = {given.v_eps:g} m/s, "
             "so that any direction is possible"
         )
-        return Claim({"M_v1": velocity_error}, assumes, why)
-    return Claim({"M_v1": velocity_error, "M_alpha1": math.asin(velocity_error / given.v_eps)}, assumes)
+        return Claim(figures, assumes, why)
+    return Claim(figures | {"M_alpha1": math.asin(velocity_error / given.v_eps)}, assumes)
 
 
 def _h(given: Assumptions, velocity_error: float, held: InvariantSet | None) -> Claim:

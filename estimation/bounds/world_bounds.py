@@ -28,8 +28,6 @@ class PositionBounds(NamedTuple):
 
     ``leader``, ``follower``: bounds of the errors of their measured positions, in any direction [m].
     ``acceleration`` [m/s^2] of the leader, and its limit k_v [m/s]. ``longest`` [s]: the best window.
-    ``response``, ``reach``: largest errors of the filter's velocity [m/s] and position [m] under both, inf
-    where they are not known.
     """
 
     leader: float
@@ -37,8 +35,6 @@ class PositionBounds(NamedTuple):
     acceleration: float
     k_v: float
     longest: float
-    response: float
-    reach: float
 
 
 class PositionErrors(NamedTuple):
@@ -51,10 +47,10 @@ class PositionErrors(NamedTuple):
 
 @kernel
 def position_errors(seen: Moment, window: WindowVelocity, known: PositionBounds) -> PositionErrors:
-    """How wrong speed, velocity and line can be; without a window, as wrong as the filter may make them."""
+    """How wrong speed, velocity and line can be; without a window only the leader's limit is known."""
     if not window.span > 0.0:
-        velocity = min(known.response, seen.v1 + known.k_v)
-        return PositionErrors(velocity, velocity, known.reach + known.follower)
+        velocity = seen.v1 + known.k_v
+        return PositionErrors(velocity, velocity, math.inf)
     A, since = known.acceleration, window.since
     difference = 2.0 * known.leader / window.span + 0.5 * A * window.span
     off = difference + A * since

@@ -167,7 +167,8 @@ def _moves(t: FloatArray, poses: FloatArray) -> _Moves:
     ]
     moved, noise = along_body(rate), 0.5 * (along_body(apart[0]) - along_body(apart[1]))
     good = np.isfinite(moved).all(axis=1) & np.isfinite(noise).all(axis=1)
-    return _Moves(grid[good], *moved[good].T, noise[good])
+    along, across, turn = moved[good].T
+    return _Moves(grid[good], along, across, turn, noise[good])
 
 
 def _rough_yaw(moves: _Moves) -> float | None:

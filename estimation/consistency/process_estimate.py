@@ -34,7 +34,7 @@ MEMBERS = TURN_MEMBERS + SPEED_MEMBERS
 FORGOTTEN = 30.0
 """Time [s] in which scores are forgotten."""
 
-SHARE = 0.8
+SHARE = 0.85
 """Share of the likeliest noise that is taken. For leaders that move as the filter's model says it makes
 errors larger than reported by a tenth; for those that steer smoothly what is reported is too large by more.
 """
@@ -42,7 +42,7 @@ errors larger than reported by a tenth; for those that steer smoothly what is re
 _TOLD_SD = math.log(10.0)  # what is told is known to a factor of ten
 _SPEED_FALLING, _TURN_FALLING = 0.75, 0.25  # [1/s]: who drives calmly for a while need not be calm
 _INTERVAL_NS = 30_000_000
-_SETTLING_NS = 500_000_000
+_SETTLING_NS = 1_000_000_000
 _LARGEST_NIS = 400.0  # a member further off starts again from the main filter
 _NS = 1e-9
 _SAME = 1e-6  # [s]

@@ -1,7 +1,9 @@
 """What the limits of a leader say of its motion all along, where measurements say little.
 
 Speed and turn rate of a random walk wander off beyond all limits. A leader of which v_eps, k_v and k_u are
-known has turn rates of mean 0 and variance k_u^2 / 3, and drives at a speed between v_eps and k_v. This is
+known has turn rates of mean 0 and variance k_u^2 / 3, and drives at a speed between v_eps and k_v, the middle
+of which is told to one that seems faster than that. One that seems slower is left alone: to be told a least
+speed would hold a velocity that points the wrong way there, since the way back leads past zero. All this is
 told to the belief over and over, with the density that holds a variance, driven by q, at the known one s^2:
 of P' = q - P^2 / r with r = s^4 / q, s^2 is the rest point. Where measurements hold the variance far below
 it, the limits have next to no weight; over a gap, or for what nobody sees, they are all there is.
@@ -46,7 +48,8 @@ def within_limits(b: Gaussian, dt: float, noise: ProcessNoise, limits: LeaderLim
     turn = limits.k_u * limits.k_u * (1.0 / 3.0)
     b = _told(b, _Column(b.x_u, b.y_u, b.vx_u, b.vy_u, b.u_u), b.u_u, -b.u, turn * turn / (noise.q_u * dt))
     speed, least = math.sqrt(b.vx * b.vx + b.vy * b.vy), limits.v_eps
-    if speed <= least or limits.k_v <= least:
+    middle = 0.5 * (limits.k_v + least)
+    if speed <= middle or limits.k_v <= least:
         return b
     c, s = b.vx / speed, b.vy / speed
     along = _Column(
@@ -62,7 +65,7 @@ def within_limits(b: Gaussian, dt: float, noise: ProcessNoise, limits: LeaderLim
     if weight <= 0.0:
         return b
     span = limits.k_v - least
-    known, middle = span * span * (1.0 / 12.0), 0.5 * (limits.k_v + least)
+    known = span * span * (1.0 / 12.0)
     variance = known * known / (weight * weight * noise.q_v * dt)
     return _told(b, along, c * along.vx + s * along.vy, middle - speed, variance)
 

@@ -26,9 +26,9 @@ from formation.kernel import kernel
 from formation.records import Rows
 from formation.ring import Ring
 
-LASTING = 0.2
-"""Correlation time [s] of what a changing motion does to odometry: slip, and wheels that lag behind, last as
-long as it takes a wheel's speed to settle."""
+LASTING = 0.5
+"""Correlation time [s] of what a changing motion does to odometry: slip, and wheels that lag behind, last for
+about as long as a manoeuvre does."""
 
 _DELAYS = 5  # that a lag is tried with
 _NS = 1e-9

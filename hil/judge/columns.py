@@ -17,6 +17,7 @@ from formation.angles import FloatArray
 from hil.judge.run_data import RunData, Span, evaluation_span, run_span
 from hil.judge.true_states import Stamps, TrueStates
 from hil.nodes.controller_desk import STOPS
+from hil.scenario.leader_model import follower_mount, leader_mount
 from hil.wire.message_types import Command, LeaderEstimate
 from hil.wire.messages import to_ns
 
@@ -206,9 +207,12 @@ def command_columns(run_data: RunData) -> CommandColumns:
 
 
 def true_states(run_data: RunData) -> TrueStates:
-    """Columns of a run's truth."""
-    kept = run_data.kept
-    return TrueStates.of(run_data.truth) if kept is None else TrueStates.of_rows(kept.truths)
+    """Columns of a run's truth, of the robots even where the log's is of the bodies on them."""
+    kept, scenario = run_data.kept, run_data.scenario
+    states = TrueStates.of(run_data.truth) if kept is None else TrueStates.of_rows(kept.truths)
+    if not run_data.truth_of_bodies:
+        return states
+    return states.of_robots(leader_mount(scenario), follower_mount(scenario))
 
 
 def inside(moments_ns: Stamps, span: Span) -> NDArray[np.bool_]:

@@ -15,7 +15,13 @@ from hil.judge.frames import Frames, Numbered, frames_of
 from hil.judge.made_by import law_facts
 from hil.judge.side_orders import Order, orders_of
 from hil.judge.sound_messages import is_sound
-from hil.log.metadata import IMPORT, mode_of, recorded_certificate, scenario_of
+from hil.log.metadata import (
+    IMPORT,
+    mode_of,
+    recorded_certificate,
+    scenario_of,
+    truth_is_of_bodies,
+)
 from hil.log.reader import Log, Record
 from hil.nodes.findings import Findings, all_found, findings_in
 from hil.nodes.noise_report import scale_in
@@ -66,6 +72,7 @@ class RunData:
     place of estimates, commands, truth and arrivals, which are empty then. ``law``: what is to be said of a
     law of one's own. ``noise_scale``: noise of positions as it was found over what was told, None if it was
     not looked for. ``found``: findings by the nodes' names, None where no node could have told any.
+    ``truth_of_bodies``: whether the truth in the log is of rigid bodies and not of the robots below.
 
     A replay is judged on the run data of its log with its own estimates and counts put in by
     :func:`dataclasses.replace`.
@@ -93,6 +100,7 @@ class RunData:
     law: Mapping[str, Any] = field(default_factory=dict)
     noise_scale: float | None = None
     found: Mapping[str, Findings] | None = None
+    truth_of_bodies: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,6 +191,7 @@ def run_data_of_link(log: Log, link: Link) -> RunData:
     run_data = RunData(
         scenario=scenario,
         mode=mode_of(log) or IMPORT,
+        truth_of_bodies=truth_is_of_bodies(log),
         estimates=estimates,
         commands=_decoded(log, records[names.command], Command),
         truth=truth,
@@ -211,6 +220,7 @@ def run_data_of_kept(log: Log, replay: KeptReplay) -> RunData:
     run_data = RunData(
         scenario=link.scenario,
         mode=mode_of(log) or IMPORT,
+        truth_of_bodies=truth_is_of_bodies(log),
         estimates=(),
         taken=replay.taken,
         refused=replay.refused,

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation.angles import FloatArray, wrap
+from formation.mount import Mount, is_aligned
 from hil.wire.message_types import Truth
 from hil.wire.messages import to_ns
 
@@ -86,6 +87,24 @@ class TrueStates:
             change[:, _HEADINGS] = wrap(change[:, _HEADINGS])
             rows[between] = _with_shape(first + share[:, np.newaxis] * change)
         return _states(moments_ns, rows)
+
+    def of_robots(self, leader: Mount, follower: Mount) -> TrueStates:
+        """The truth of the robots, if this is of bodies that sit on them so; unchanged where none is mounted.
+
+        A body's speed along its own axis is cos(yaw) (v - u y) + sin(yaw) u x, which tells the robot's v.
+        """
+        if is_aligned(leader) and is_aligned(follower):
+            return self
+        rows = self._rows()[:, :_RECORDED_SIZE].copy()
+        for first, (v, u), mount in ((0, (6, 7), leader), (3, (8, 9), follower)):
+            theta = rows[:, first + 2] - mount.yaw
+            cos, sin = np.cos(theta), np.sin(theta)
+            rows[:, first] -= cos * mount.x - sin * mount.y
+            rows[:, first + 1] -= sin * mount.x + cos * mount.y
+            rows[:, first + 2] = theta
+            aside = math.sin(mount.yaw) * rows[:, u] * mount.x
+            rows[:, v] = (rows[:, v] - aside) / math.cos(mount.yaw) + rows[:, u] * mount.y
+        return _states(self.capture_ns, _with_shape(rows))
 
     def _rows(self) -> FloatArray:
         motions = (self.v1, self.u1, self.v2, self.u2)

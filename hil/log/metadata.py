@@ -54,6 +54,11 @@ def mode_of(log: Log) -> str | None:
     return log.metadata.get(RECORD, {}).get("mode")
 
 
+def truth_is_of_bodies(log: Log) -> bool:
+    """Whether the truth that a log has was made of mocap poses, as an import of MRCLAM's is."""
+    return "folder" in log.metadata.get("source", {})
+
+
 def version_of(log: Log) -> str | None:
     """Version of abreast that wrote a log; None for a log that is not ours or does not say."""
     return log.metadata.get(RECORD, {}).get("version")

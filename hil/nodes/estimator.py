@@ -22,7 +22,7 @@ from formation.records import load
 from hil.nodes.certifying import Believed, certifying
 from hil.nodes.estimator_inputs import RESTARTED, SEEN, SET_BACK, TICK_NS
 from hil.nodes.estimator_memory import EstimatorMemory, node_rules
-from hil.nodes.estimator_step import AUTO, MOCAP, Known, is_under_way
+from hil.nodes.estimator_records import AUTO, MOCAP, Known
 from hil.nodes.findings import Findings, named_findings
 from hil.nodes.frame_time import clock_report
 from hil.nodes.leader_findings import leader_findings
@@ -30,6 +30,7 @@ from hil.nodes.mount_report import mount_findings, mount_problem, mount_report
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
 from hil.nodes.noise_report import is_refuted, noise_findings, noise_report, scale_of
 from hil.nodes.odometry_findings import odometry_findings
+from hil.nodes.own_motion_step import is_under_way
 from hil.nodes.process_report import process_report
 from hil.nodes.sensor_offsets import offsets_report
 from hil.scenario.files import refuse_unrunnable

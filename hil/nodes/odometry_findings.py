@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from estimation.own_motion.odometry_check import POSE, TRACK, OdometryCheck, Sums, source_of
-from hil.nodes.estimator_step import AUTO, Known, Rules
+from hil.nodes.estimator_records import AUTO, Known, Rules
 
 FINDING = "finding."
 """What the names of findings begin with among the values of a node's diagnostics."""

@@ -71,7 +71,7 @@ class _File(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 @dataclass(frozen=True, slots=True)
 class MappedTopics:
-    """Topics of :class:`TopicNames` without leading slashes; ``types`` of those for which the map says one."""
+    """Topics of :class:`TopicNames` without leading slashes, and ``types`` that the map tells of them."""
 
     odometry: str | None
     rigid_bodies: str | None

@@ -7,11 +7,14 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from estimation.bounds.assumptions import Assumptions
+from estimation.bounds.filter_response import Disturbances, FlyingFilter, worst_responses
+from estimation.bounds.guarantees import leader_acceleration
 from formation.shape import ABREAST_ALPHA2
 from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
 from formation.station import Side
 from hil.extensions.reference import is_reference, short
+from hil.scenario.leader_model import leader_limits, process_noise
 from hil.scenario.noise_bounds import NOISE_SIGMAS, position_bound
 from hil.scenario.schema import Scenario, TableProgram
 
@@ -47,7 +50,20 @@ def assumptions_of(scenario: Scenario, *, driven: bool = True) -> Assumptions:
         side=Side(scenario.formation.side),
         unproved=_unproved(scenario),
         unknown_steering=_other_law(scenario),
+        filter_error=_filter_error(scenario, eps),
     )
+
+
+def _filter_error(scenario: Scenario, eps: float) -> float | None:
+    """Largest velocity error of the extended filter with the process noise that the scenario tells."""
+    given, leader = scenario.estimator, scenario.leader
+    if (given.kind, given.front_end) != ("ekf", "world"):
+        return None
+    flying = FlyingFilter(
+        given.sigma_position, 1.0 / scenario.mocap.rate_hz, process_noise(scenario), leader_limits(scenario)
+    )
+    bounds = Disturbances(eps, float(leader_acceleration(leader.k_v, leader.k_u)))
+    return worst_responses(flying, bounds).velocity
 
 
 def _unproved(scenario: Scenario) -> str:
@@ -128,6 +144,8 @@ def certificate_lines(certificate: Certificate) -> Iterator[tuple[str, str, tupl
         title, text = _TITLES[name]
         figures = claim.figures
         finding = (text or _SET).format(**_rounded(figures)) if figures else "nothing is guaranteed"
+        if "M_v1_filter" in figures:
+            finding += f" ({_rounded(figures)['M_v1_filter']:.4f} by the filter that flies)"
         if "M_alpha1" in figures:
             finding += f", alpha1 within {_rounded(figures)['M_alpha1']:.4f} rad"
         yield title, finding + (f": {claim.why}" if claim.why else ""), claim.assumes

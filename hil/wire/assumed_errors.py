@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.bounds.error_bounds import InputErrors, Perceived, RateErrors
-from estimation.bounds.filter_response import Disturbances, FlyingFilter, Responses, worst_responses
 from estimation.bounds.guarantees import guaranteed_rate, guaranteed_window, leader_acceleration
 from estimation.bounds.live_bounds import ErrorBounds, LawConstants, Moment, MomentBounds, bounds_at
 from estimation.bounds.window_velocity import WindowVelocity
@@ -19,7 +18,7 @@ from estimation.tracking.estimate import Estimate
 from formation.angles import FloatArray
 from formation.kernel import kernel
 from formation.spacing import Spacing
-from hil.scenario.leader_model import leader_limits, own_noise, process_noise
+from hil.scenario.leader_model import own_noise
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 
@@ -106,31 +105,13 @@ def position_bounds(scenario: Scenario) -> PositionBounds:
     """
     eps, leader = math.sqrt(2.0) * _SIGMAS * scenario.estimator.sigma_position, scenario.leader
     acceleration = float(leader_acceleration(leader.k_v, leader.k_u))
-    worst = filter_responses(scenario, eps)
     return PositionBounds(
         leader=eps,
         follower=eps,
         acceleration=acceleration,
         k_v=leader.k_v,
         longest=float(guaranteed_window(eps, acceleration)),
-        response=worst.velocity,
-        reach=worst.position,
     )
-
-
-def filter_responses(scenario: Scenario, eps: float) -> Responses:
-    """Largest errors of the scenario's filter under noise within eps [m]; infinite where it is another one.
-
-    Those of the extended filter with the process noise that the scenario tells, at its frame rate.
-    """
-    given, leader = scenario.estimator, scenario.leader
-    if (given.kind, given.front_end) != ("ekf", "world"):
-        return Responses(math.inf, math.inf)
-    flying = FlyingFilter(
-        given.sigma_position, 1.0 / scenario.mocap.rate_hz, process_noise(scenario), leader_limits(scenario)
-    )
-    acceleration = float(leader_acceleration(leader.k_v, leader.k_u))
-    return worst_responses(flying, Disturbances(eps, acceleration))
 
 
 def _own_motion_noise(scenario: Scenario) -> tuple[float, float]:

@@ -28,9 +28,9 @@ def drive(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Times, poses of a body at MOUNT and true speeds; the heading's noise is 12 rad/m of it."""
     random = np.random.default_rng(seed)
-    t = np.arange(round(seconds / STEP)) * STEP
+    t: FloatArray = np.arange(round(seconds / STEP)) * STEP
     u = mean_turn + turn * np.sin(omega * t + seed)
-    v = 0.08 + faster_by_turn * u
+    v: FloatArray = 0.08 + faster_by_turn * u
     theta = np.cumsum(u) * STEP + random.uniform(-3.0, 3.0)
     x, y = np.cumsum(v * np.cos(theta)) * STEP, np.cumsum(v * np.sin(theta)) * STEP
     seen = slice(None, None, 1200 // rate)

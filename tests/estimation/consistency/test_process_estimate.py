@@ -92,7 +92,7 @@ def test_the_bandwidths_of_a_leader_are_found_whatever_is_told(
 def test_before_the_track_has_settled_it_is_as_told() -> None:
     rules, generator = learning(0.5, 0.01), np.random.default_rng(1)
     estimator, bank, learned = main_filter(rules), rows_of(Member, MEMBERS), NOTHING_LEARNED
-    for k in range(40):
+    for k in range(60):
         measurement = sighted(generator, k, np.zeros(5))
         learned = learn(learned, bank, begun(measurement, estimator), rules, estimator)
     assert learned == NOTHING_LEARNED
@@ -109,7 +109,7 @@ def test_a_new_track_starts_the_bank_anew_and_keeps_what_was_learned() -> None:
     there = np.array([5.0, 5.0, 0.08, 0.0, 0.0])
     k = 1000
     while not again.begun:
-        assert (k - 1000) * STEP < 0.6
+        assert (k - 1000) * STEP < 1.1
         measurement = sighted(generator, k, there)
         here = point(measurement, estimator.start(measurement), estimator)
         again = learn(again, bank, here, rules, estimator)

@@ -8,6 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from formation.mount import NO_MOUNT, Mount, body_pose
+from formation.pose import Pose
 from hil.judge.run_data import RunData
 from hil.judge.true_states import LONGEST_GAP_NS, TrueStates
 from hil.wire.message_types import Truth
@@ -83,3 +85,24 @@ def test_a_leader_that_backs_up_has_the_shape_of_one_that_faces_the_other_way(
     backwards = TrueStates.of(turned)
     for name in TrueStates.__slots__:
         np.testing.assert_allclose(getattr(backwards, name), getattr(forwards, name), atol=1e-12)
+
+
+def test_truth_of_bodies_becomes_that_of_the_robots_below() -> None:
+    leader, follower = Mount(0.05, -0.02, 0.2), Mount(0.0, 0.03, -0.1)
+    rows, bodies = [], []
+    for k in range(5):
+        poses = Pose(0.1 * k, 0.2, 0.3 * k), Pose(1.0, 0.1 * k, -0.2 * k)
+        motions = ((0.1, 0.3), (0.2, -0.2))
+        rows.append([*poses[0], *poses[1], *motions[0], *motions[1]])
+        seen = [body_pose(pose, mount) for pose, mount in zip(poses, (leader, follower), strict=True)]
+        speeds = [
+            (math.cos(m.yaw) * (v - u * m.y) + math.sin(m.yaw) * u * m.x, u)
+            for (v, u), m in zip(motions, (leader, follower), strict=True)
+        ]
+        bodies.append([*seen[0], *seen[1], *speeds[0], *speeds[1]])
+    stamps = np.arange(5, dtype=np.int64)
+    wanted = TrueStates.along(stamps, np.array(rows))
+    found = TrueStates.along(stamps, np.array(bodies)).of_robots(leader, follower)
+    for name in ("leader", "follower", "v1", "u1", "v2", "u2", "rho", "alpha1", "alpha2", "rho_dot"):
+        np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), atol=1e-12)
+    assert wanted.of_robots(NO_MOUNT, NO_MOUNT) is wanted

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from hil.log.metadata import certificate_metadata, recorded_certificate
 from hil.log.reader import read_log
 from hil.log.report_json import known
 from hil.log.writer import LogWriter
-from hil.scenario.certificate import assumptions_of, certificate_json, certificate_of
+from hil.scenario.certificate import assumptions_of, certificate_json, certificate_lines, certificate_of
 from hil.scenario.files import load_scenario, scenario_names
 
 CONTRACT = {
@@ -83,3 +84,29 @@ def test_the_left_mirrors_the_right_and_other_formations_are_not_certified() -> 
         for claim in (certificate.formation, certificate.formation_with_errors, certificate.k_u_star):
             assert not claim.figures
             assert other.split("=")[0] in (claim.why or "")
+
+
+def test_what_is_printed_is_rounded_to_the_safe_side() -> None:
+    """A lower bound down, an upper one up, and neither by more than its last digit."""
+    certificate = certificate_of(load_scenario("turtlebot3"))
+    lines = {name.strip(): text for name, text, _ in certificate_lines(certificate)}
+    told = {
+        "formation": ("rho_min", "rho_max", "alpha1_min", "alpha1_max"),
+        "with wrong estimates": ("rho_min", "rho_max", "alpha1_min", "alpha1_max"),
+        "k_u* of Prop. 3": ("lower", "upper"),
+    }
+    claims = (certificate.formation, certificate.formation_with_errors, certificate.k_u_star)
+    for (name, figures), claim in zip(told.items(), claims, strict=True):
+        printed_ = [float(number) for number in re.findall(r"-?\d+\.\d{4}", lines[name])]
+        for number, figure in zip(printed_, figures, strict=True):
+            outwards = number - claim.figures[figure]
+            if figure in ("rho_min", "alpha1_min", "lower"):
+                outwards = -outwards
+            assert 0.0 <= outwards < 1e-4, (name, figure)
+
+
+def test_what_the_filter_that_flies_may_err_is_told_where_it_is_known() -> None:
+    found = certificate_of(load_scenario("turtlebot3")).estimates
+    assert found.figures["M_v1"] < found.figures["M_v1_filter"] < 0.06
+    for other in ("estimator.kind=ukf", "estimator.front_end=body"):
+        assert "M_v1_filter" not in certificate_of(load_scenario("turtlebot3", (other,))).estimates.figures
