@@ -33,7 +33,7 @@ REFUTED = 1.3
 _NS = 1e-9
 STRIDE_NS = 47_000_000  # no multiple of a usual spacing of frames, so that a microsecond doesn't matter
 LONGEST_NS = 520_000_000  # four positions further apart tell more of the motion than of the noise
-_ANOTHER = 1.3  # factor between two scales from which on they don't agree
+_ANOTHER = 1.2  # factor between two scales from which on they don't agree
 _LEAST_LEFT = 0.05  # of an innovation after the update; what leaves less tells nothing of the noise
 _HALF_TRACK = 0.1  # by which a turn rate is the speed of a wheel [m]
 

@@ -39,6 +39,7 @@ from estimation.tracking.estimate import estimate_at, guessed_when_slow
 from estimation.tracking.follower_check import BELIEVED, MOUNT
 from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
 from estimation.tracking.follower_check import GATED as LEADER_OFF
+from estimation.tracking.manoeuvre import steady
 from estimation.tracking.mount_check import is_off
 from estimation.tracking.mount_check import watched as mount_watched
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE, RESTARTED, USED, TrackPoint
@@ -134,7 +135,9 @@ def _on_other_noise(known: Known, memory: Memory, estimator: Filter) -> Known:
     if ring.length > 0 and noise.scale.position > noise.basis:
         by, point = noise.scale.position / noise.basis, newest(points, ring)
         wider = estimator.widened(point.belief, by * by)
-        store(points, place(ring, points, ring.length - 1), point._replace(belief=wider))
+        # Innovations that leaned to one side were noise.
+        point = point._replace(belief=wider, manoeuvre=steady())
+        store(points, place(ring, points, ring.length - 1), point)
     for k in range(MEMBERS):
         store(memory.bank, k, load(Member, memory.bank, k)._replace(score=0.0))
     noise = noise._replace(basis=noise.scale.position)

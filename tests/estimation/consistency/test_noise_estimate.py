@@ -15,6 +15,7 @@ from estimation.consistency.noise_estimate import (
     Moment,
     NoiseEstimate,
     NoiseLearning,
+    is_another,
     kept_noise,
     noise_with_frame,
     scaled_noise,
@@ -230,3 +231,11 @@ def test_when_frames_before_are_forgotten_what_they_told_is_not() -> None:
     assert scaled_noise(TOLD, kept) == PoseNoise(
         TOLD.position * kept.scale.position, TOLD.heading * kept.scale.heading
     )
+
+
+@pytest.mark.parametrize(
+    ("scale", "another"), [(0.8, True), (0.9, False), (1.0, False), (1.15, False), (1.25, True)]
+)
+def test_noise_is_another_one_from_a_fifth_on(scale: float, another: bool) -> None:
+    found = NOISE_AS_TOLD._replace(scale=NOISE_AS_TOLD.scale._replace(position=2.0 * scale), basis=2.0)
+    assert is_another(found) == another

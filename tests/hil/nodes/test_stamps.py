@@ -60,9 +60,11 @@ def drive(seed: int) -> list[Sent]:
     return sent
 
 
-def estimates(sent: list[Sent], source: str) -> dict[int, tuple[float, float]]:
+def estimates(
+    sent: list[Sent], source: str, process_noise: str = "estimated"
+) -> dict[int, tuple[float, float]]:
     """v1 and alpha1 of tracking estimates after every instant, by the frame's number."""
-    given = {"estimator.own_motion": source, "estimator.front_end": "world"}
+    given = {"estimator.own_motion": source, "estimator.process_noise": process_noise}
     scenario = load_scenario("turtlebot3", given)
     rules, memory = rules_of(scenario), EstimatorNode(scenario).rows_only(0).memory.desk.memory()
     known, found = NOTHING_KNOWN, {}
@@ -127,7 +129,8 @@ def test_two_frames_a_microsecond_apart_do_not_make_the_speed_jump(source: str) 
             dx, dy = (3e-4 * random.standard_normal(2)).tolist()
             again = each.frame._replace(leader_x=each.frame.leader_x + dx, leader_y=each.frame.leader_y + dy)
             doubled.append(Sent(each.stamp_ns + 1000, again, None))
-    found, others = estimates(sent, source), estimates(doubled, source)
+    # How the leader drives is found out by all frames, other ones too.
+    found, others = (estimates(each, source, "given") for each in (sent, doubled))
     late = [number for number in found.keys() & others.keys() if number > 120]
     assert len(late) > 200
-    assert all(abs(found[number][0] - others[number][0]) < 3e-3 for number in late)
+    assert all(abs(found[number][0] - others[number][0]) < 5e-3 for number in late)
