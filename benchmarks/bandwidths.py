@@ -40,7 +40,7 @@ from formation.records import Rows, borrowed, columns_of, load, row_of, rows_of,
 from hil.nodes import estimator_step
 from hil.nodes.estimator_desk import NOTHING_KNOWN
 from hil.nodes.estimator_memory import rules_of
-from hil.nodes.estimator_step import Known, Memory, Rules
+from hil.nodes.estimator_records import Known, Memory, Rules
 from hil.scenario.files import load_scenario
 
 FloatArray = NDArray[np.float64]

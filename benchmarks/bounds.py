@@ -12,6 +12,7 @@ limits, by chance or when it hurts, and how close to the edge of the certified s
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import time
 from collections import Counter
@@ -64,7 +65,8 @@ def challenge(pairs: int, duration: float, seed: int) -> None:
         system = Disturbed(setting.mu1, setting.spacing, SpeedRange(setting.v1, setting.v1), k_u)
         found = invariant_set(system)
         margin = steering_margin(setting.mu1, setting.spacing, setting.v1)
-        print(f"\n{name}: k_u* between {margin.lower:.3f} and {margin.upper:.3f} rad/s")
+        low, high = math.floor(1e3 * margin.lower) / 1e3, math.ceil(1e3 * margin.upper) / 1e3
+        print(f"\n{name}: k_u* between {low:.3f} and {high:.3f} rad/s")
         if found is None:
             print("  no certified set")
             continue

@@ -44,7 +44,7 @@ from formation.shape import Shape, follower_pose, shape_of, shape_rates
 from hil.emulator.faults import Pair, fault_rows, faulty
 from hil.nodes.estimator import EstimatorNode
 from hil.nodes.estimator_desk import TimedFrame
-from hil.nodes.estimator_step import Known
+from hil.nodes.estimator_records import Known
 from hil.scenario.files import load_scenario
 from hil.scenario.parts import gains, leader_program
 from hil.scenario.schema import FaultSection, Scenario

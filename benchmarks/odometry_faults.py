@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from formation.records import columns_of, load
 from hil.lockstep.flyer import Flyer
 from hil.nodes.estimator_memory import rules_of
-from hil.nodes.estimator_step import Known
+from hil.nodes.estimator_records import Known
 from hil.nodes.odometry_findings import odometry_findings
 from hil.scenario.files import load_scenario
 from hil.sweep.tally import judge_run, orbit_of

@@ -1,10 +1,11 @@
-"""How well leaders of real recordings are estimated: MRCLAM pairs by every front end, and a TurtleBot3's LiDAR.
+"""How well leaders of real recordings are estimated: MRCLAM pairs by every front end, a TurtleBot3 by LiDAR.
 
-Run with ``ABREAST_REAL`` naming the folder of the recordings: ``python benchmarks/recordings.py``. One line for
-each way of measuring, medians over pairs: RMSE of v1 while tracking, that over the RMSE of the best constant
-guess (over the same samples, and over all that is known of the leader), median error of alpha1, correlation of
-v1 with the truth, share of the measurements of a moving leader at which it is tracked, share of alpha1 beyond five standard deviations,
-and the mean of e^2 / var of v1 and alpha1.
+    ABREAST_REAL=FOLDER python benchmarks/recordings.py [--only camera] [--set KEY=VALUE] [--each]
+
+One line for each way of measuring, medians over pairs: RMSE of v1 while tracking, that over the RMSE of the best
+constant guess (over the same samples, and over all that is known of the leader), median error of alpha1,
+correlation of v1 with the truth, share of the measurements of a moving leader at which it is tracked, share of
+alpha1 beyond five standard deviations, the mean of e^2 / var of v1 and alpha1, and the mean NIS.
 """
 
 from __future__ import annotations

@@ -87,10 +87,9 @@ class Certificate:
 
 @lru_cache(maxsize=32)
 def certify(given: Assumptions) -> Certificate:
-    """Certificate of a pair and its leader; takes some tenths of a second, the first time."""
+    """Certificate of a pair and its leader; takes a second or so, the first time."""
     velocity_error = given.velocity_error
-    system = Disturbed(given.mu1, given.spacing, given.speeds, given.k_u)
-    held = None if given.unproved else invariant_set(system)
+    system, held = _held(given)
     rates = _rates(given, velocity_error, held)
     return Certificate(
         velocity_error=velocity_error,
@@ -103,6 +102,23 @@ def certify(given: Assumptions) -> Certificate:
         formation_with_errors=_formation_with_errors(given, velocity_error, system, held),
         k_u_star=_k_u_star(given),
     )
+
+
+def formation_claim(given: Assumptions) -> Claim:
+    """The claim ``formation`` of :func:`certify` alone: for those who go through many."""
+    return _formation(given, *_held(given), "exact estimates")
+
+
+def rates_claim(given: Assumptions) -> Claim:
+    """The claim ``rates`` of :func:`certify` alone."""
+    return _rates(given, given.velocity_error, _held(given)[1])
+
+
+@lru_cache(maxsize=32)
+def _held(given: Assumptions) -> tuple[Disturbed, InvariantSet | None]:
+    """The reduced system with exact estimates, and its set if there is one that is known."""
+    system = Disturbed(given.mu1, given.spacing, given.speeds, given.k_u)
+    return system, None if given.unproved else invariant_set(system)
 
 
 def _sources(given: Assumptions) -> tuple[str, ...]:

@@ -3,8 +3,8 @@
 A robot on wheels moves along its heading only. Its body, at m on the robot and turned by yaw, therefore moves
 along the robot's axes as ``(v - u m_y, u m_x)``: what is across the heading in proportion to the speed tells
 the yaw, what is across in proportion to the turn rate tells m_x, and what is along in proportion to the turn
-rate, beside the wheels' own speed, tells m_y. Of a robot whose wheels tell nothing, the speed is taken to
-change slowly, or alike in left and right turns.
+rate, beside the wheels' own speed, tells m_y. What slips in turns does so alike to the left and to the right.
+Of a robot whose wheels tell nothing, the speed is taken to change slowly, or alike in left and right turns.
 """
 
 from __future__ import annotations
@@ -88,9 +88,14 @@ class _Moves:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rows:
-    """What is regressed on, (n, k), the noise in that, and how large (k,) its coefficients are beforehand."""
+    """What is regressed, and on what.
 
+    ``seen`` (n,) on ``values`` (n, k), the noise in both, and how large (k,) coefficients are beforehand.
+    """
+
+    seen: FloatArray
     values: FloatArray
+    seen_noise: FloatArray
     noise: FloatArray
     likely: FloatArray
 
@@ -121,7 +126,7 @@ def find_mount(t: FloatArray, poses: FloatArray, wheels: WheelSpeed | None = Non
         return NOTHING_FOUND
     across = None
     for _ in range(_ROUNDS):
-        across = _regression(moves.t, *_by_speed_and_turn(moves, yaw))
+        across = _regression(moves.t, _by_speed_and_turn(moves, yaw))
         if across is None:
             return NOTHING_FOUND
         yaw = float(wrap(yaw + math.asin(max(-0.5, min(0.5, float(across.values[0]))))))
@@ -183,14 +188,21 @@ def _ahead(along: FloatArray, across: FloatArray, yaw: float) -> FloatArray:
     return math.cos(yaw) * along - math.sin(yaw) * across
 
 
-def _by_speed_and_turn(moves: _Moves, yaw: float) -> tuple[FloatArray, _Rows]:
+def _left(along: FloatArray, across: FloatArray, yaw: float) -> FloatArray:
+    """What of it is across the heading, to the left."""
+    return math.sin(yaw) * along + math.cos(yaw) * across
+
+
+def _by_speed_and_turn(moves: _Moves, yaw: float) -> _Rows:
     """Velocity across the heading that a yaw stands for, and what tells by how much that is off, and m_x."""
-    left = math.sin(yaw) * moves.along + math.cos(yaw) * moves.across
-    ahead = _ahead(moves.along, moves.across, yaw)
-    noise = _ahead(moves.noise[:, 0], moves.noise[:, 1], yaw)
-    values = np.column_stack([-ahead, moves.turn])
-    likely = np.array([math.inf, _LIKELY_PLACE])
-    return left, _Rows(values, np.column_stack([-noise, moves.noise[:, 2]]), likely)
+    along_noise, across_noise, turn_noise = moves.noise.T
+    return _Rows(
+        _left(moves.along, moves.across, yaw),
+        np.column_stack([-_ahead(moves.along, moves.across, yaw), moves.turn]),
+        _left(along_noise, across_noise, yaw),
+        np.column_stack([-_ahead(along_noise, across_noise, yaw), turn_noise]),
+        np.array([math.inf, _LIKELY_PLACE]),
+    )
 
 
 def _sideways(moves: _Moves, yaw: float, wheels: WheelSpeed | None) -> tuple[float, float]:
@@ -200,13 +212,14 @@ def _sideways(moves: _Moves, yaw: float, wheels: WheelSpeed | None) -> tuple[flo
         further = told
         good = np.isfinite(told).all(axis=1)
     else:
-        further = np.column_stack([np.abs(moves.turn), _slow(moves.t)])
+        further = _slow(moves.t)
         good = np.abs(ahead) > 0.5 * float(np.median(np.abs(ahead)))
-    values = np.column_stack([-moves.turn, further])[good]
+    values = np.column_stack([-moves.turn, np.abs(moves.turn), further])[good]
     noise = np.zeros_like(values)
     noise[:, 0] = turn_noise[good]
-    likely = np.array([_LIKELY_PLACE, *[math.inf] * further.shape[1]])
-    fit = _regression(moves.t[good], ahead[good], _Rows(values, noise, likely))
+    likely = np.array([_LIKELY_PLACE, *[math.inf] * (values.shape[1] - 1)])
+    ahead_noise = _ahead(moves.noise[:, 0], moves.noise[:, 1], yaw)
+    fit = _regression(moves.t[good], _Rows(ahead[good], values, ahead_noise[good], noise, likely))
     return (0.0, math.inf) if fit is None else fit.of(0)
 
 
@@ -236,7 +249,7 @@ def _slow(t: FloatArray) -> FloatArray:
     return np.column_stack([np.cos(math.pi * k * (t - t[0]) / span) for k in waves])
 
 
-def _regression(t: FloatArray, seen: FloatArray, rows: _Rows) -> _Fit | None:
+def _regression(t: FloatArray, rows: _Rows) -> _Fit | None:
     """Robust regression on rows that are noisy themselves; None for a span that is too short.
 
     A direction that stands out of the noise no better than noise does is left to what is likely beforehand.
@@ -246,13 +259,14 @@ def _regression(t: FloatArray, seen: FloatArray, rows: _Rows) -> _Fit | None:
     if len(np.unique(blocks)) < known + _FEWEST_BLOCKS:
         return None
     scale = np.sqrt(np.mean(np.square(rows.values), axis=0)) + _AT_LEAST
-    values, noise = rows.values / scale, rows.noise / scale
+    values, noise, seen = rows.values / scale, rows.noise / scale, rows.seen
     found, weights, prior = np.zeros(known), np.ones(len(t)), np.zeros((known, known))
     normal, kept = np.eye(known), np.eye(known)
     for _ in range(_ROUNDS):
         signal, kept = _without_noise(values, noise, weights)
         normal = signal + prior
-        before, found = found, np.linalg.lstsq(normal, kept @ values.T @ (weights * seen), rcond=None)[0]
+        tied = values.T @ (weights * seen) - noise.T @ (weights * rows.seen_noise)
+        before, found = found, np.linalg.lstsq(normal, kept @ tied, rcond=None)[0]
         rest = seen - values @ found
         reach = _TUNING * 1.4826 * float(np.median(np.abs(rest))) + _AT_LEAST
         weights = np.square(np.maximum(0.0, 1.0 - np.square(rest / reach)))
@@ -261,8 +275,11 @@ def _regression(t: FloatArray, seen: FloatArray, rows: _Rows) -> _Fit | None:
         if np.max(np.abs(found - before)) < _CONVERGED:
             break
     inverse = np.linalg.pinv(normal)
-    scores = _scores(values, noise, weights, rest, found, blocks) @ kept.T
-    free = len(scores) / (len(scores) - known)
+    scores = values * (weights * rest)[:, np.newaxis]
+    scores -= noise * (weights * (rows.seen_noise - noise @ found))[:, np.newaxis]
+    scores = _summed(scores, blocks) @ kept.T
+    # Few blocks make for a covariance that is itself uncertain, as few degrees of freedom do.
+    free = len(scores) / max(len(scores) - known - 2.0, 1.0)
     covariance = inverse @ (free * scores.T @ scores + prior * variance) @ inverse
     return _Fit(found / scale, covariance / np.outer(scale, scale))
 
@@ -290,16 +307,8 @@ def _without_noise(
     return kept @ (back @ (whole - of_noise) @ back.T) @ (clear @ clear.T @ root.T), kept @ back
 
 
-def _scores(
-    values: FloatArray,
-    noise: FloatArray,
-    weights: FloatArray,
-    rest: FloatArray,
-    found: FloatArray,
-    blocks: NDArray[np.int64],
-) -> FloatArray:
+def _summed(scores: FloatArray, blocks: NDArray[np.int64]) -> FloatArray:
     """Sums over blocks of what would be zero on average if the coefficients were right."""
-    scores = values * (weights * rest)[:, np.newaxis] + noise * (weights * (noise @ found))[:, np.newaxis]
     there, place = np.unique(blocks, return_inverse=True)
     sums = np.zeros((len(there), scores.shape[1]))
     np.add.at(sums, place, scores)

@@ -105,8 +105,11 @@ def measure_world(
 ) -> Measurement:
     """World front end: the leader's mocap position, with covariance sigma_p^2 I."""
     variance = noise.position * noise.position
+    still = FollowerMotion(0.0, 0.0, 0.0, 0.0)
     spread, seen = Spread(variance, 0.0, variance), PairSeen(leader[0], leader[1], follower)
-    return Measurement(capture_ns, leader[0], leader[1], spread, motion, True, True, seen, noise)
+    return Measurement(
+        capture_ns, leader[0], leader[1], spread, motion, True, True, seen, noise, False, still, False
+    )
 
 
 @kernel
@@ -139,8 +142,11 @@ def measure_body(
     """
     cos, sin, sd_across = math.cos(alpha2), math.sin(alpha2), rho * sd_alpha2
     spread = spread_of_sight(cos, sin, sd_rho * sd_rho, sd_across * sd_across)
+    still = FollowerMotion(0.0, 0.0, 0.0, 0.0)
     noise, seen = PoseNoise(0.0, 0.0), PairSeen(0.0, 0.0, Pose(0.0, 0.0, 0.0))
-    return Measurement(capture_ns, rho * cos, rho * sin, spread, motion, False, False, seen, noise)
+    return Measurement(
+        capture_ns, rho * cos, rho * sin, spread, motion, False, False, seen, noise, False, still, False
+    )
 
 
 @kernel
@@ -159,8 +165,9 @@ def measure_body_from_mocap(
     along = 2.0 * noise.position * noise.position
     across = along + squared * noise.heading * noise.heading
     spread = spread_of_sight(x / rho, y / rho, along, across)
+    still = FollowerMotion(0.0, 0.0, 0.0, 0.0)
     seen = PairSeen(leader[0], leader[1], follower)
-    return Measurement(capture_ns, x, y, spread, motion, False, True, seen, noise)
+    return Measurement(capture_ns, x, y, spread, motion, False, True, seen, noise, False, still, False)
 
 
 @kernel

@@ -27,8 +27,10 @@ from formation.ring import Ring
 
 _APART = 0.3  # [s]; two poses further apart tell nothing of the moment in between
 _DOUBTS = 9.21  # chi-square quantile of 0.99 with 2 degrees of freedom, of a mean: far above any healthy one
-_REMEMBERED, _CUT = 32, 9.0  # values over which noise is averaged, and of their mean, above which one is cut
+_REMEMBERED, _CUT = 64, 30.0  # values over which noise is averaged, and of their mean, above which one is cut
+_QUADRUPLES = 4  # of poses that are looked at together
 _OFTEN = 0.025  # [s]; over four poses so far apart no robot shows a third difference
+_TRACK_HOLDS = 4.0  # variance over what is told of it
 _OUTLIER = 21.11  # chi-square quantile of 0.9999 with 3 degrees of freedom, of a pose off its track
 _NS = 1e-9
 _FRESH = 2.0  # periods of odometry
@@ -55,9 +57,12 @@ def with_own_track(
         before = own_point(own, ring, k - 1) if k > 0 else after
         if after.capture_ns != at_ns and (k == 0 or (after.capture_ns - before.capture_ns) * _NS > _APART):
             return without_track(check)
-        check = _with_noise(check, own, ring, k, noise)
+        for back in range(0, _QUADRUPLES * 4, 4):
+            check = _with_noise(check, own, ring, k - back, noise)
         seen, since = _as_seen(check, noise), check.since
-        pose = _pose_between(before, after, at_ns, seen)
+        # A track that is told too little noise gets lost: its poses are better than what it makes of them.
+        gate = _OUTLIER if max(check.place_noise, check.heading_noise) < _TRACK_HOLDS else math.inf
+        pose = _pose_between(before, after, at_ns, seen, gate)
         check = with_track(check, entries, pose, seen, trust)
         if since.stamp_ns != check.since.stamp_ns and since.stamp_ns > 0:
             check = _doubted(check, since, entries, seen, trust)
@@ -107,8 +112,8 @@ def _with_noise(
 
 @kernel
 def _averaged(mean: float, value: float, count: int) -> float:
-    """Mean with one more value, that of an outlier cut off at three standard deviations."""
-    return mean + (min(value, _CUT * max(mean, 1.0)) - mean) / count
+    """Mean with one more value, an outlier's cut off; a robot that stands shows less noise than it has."""
+    return max(1.0, mean + (min(value, _CUT * mean) - mean) / count)
 
 
 @kernel
@@ -119,21 +124,21 @@ def _as_seen(check: OdometryCheck, noise: OwnNoise) -> OwnNoise:
 
 
 @kernel
-def _shown(point: OwnPoint, noise: OwnNoise) -> Pose:
+def _shown(point: OwnPoint, noise: OwnNoise, gate: float) -> Pose:
     """The pose that a point rests on, or where its track has it if that pose is an outlier."""
     state, pose, spread = point.state, point.pose, point.spread
     dx, dy, turned = pose.x - state.x, pose.y - state.y, wrapped(pose.theta - state.theta)
     place = 2.0 * noise.pose.position * noise.pose.position + spread.x_x + spread.y_y
     heading = noise.pose.heading * noise.pose.heading + spread.t_t
-    if dx * dx + dy * dy > _OUTLIER * place or turned * turned > _OUTLIER * heading:
+    if dx * dx + dy * dy > gate * place or turned * turned > gate * heading:
         return Pose(state.x, state.y, state.theta)
     return pose
 
 
 @kernel
-def _pose_between(before: OwnPoint, after: OwnPoint, at_ns: int, noise: OwnNoise) -> Pose:
+def _pose_between(before: OwnPoint, after: OwnPoint, at_ns: int, noise: OwnNoise, gate: float) -> Pose:
     """Pose of the track at a time, linear between its points."""
-    a, b = _shown(before, noise), _shown(after, noise)
+    a, b = _shown(before, noise, gate), _shown(after, noise, gate)
     if after.capture_ns == at_ns or after.capture_ns <= before.capture_ns:
         return Pose(b.x, b.y, b.theta)
     share = (at_ns - before.capture_ns) / (after.capture_ns - before.capture_ns)

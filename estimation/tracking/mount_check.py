@@ -25,7 +25,7 @@ _SHARPEST_ARC = 1.0  # [rad]; on a longer one heading and speed may do anything 
 _CLEAR = 6.0  # standard deviations of noise that an arc is longer than, or turns by more than
 _MEMORY = 0.99  # of what was known per arc that moves: a body that is knocked aside is noticed, too
 _SLIP = 0.02  # share of an arc by which it may go aside without a mount being off
-_LIKELY_PLACE = 0.15  # [m]: how far off the middle of the wheel axis a body may sit, as a standard deviation
+_LIKELY_PLACE = 0.1  # [m]: how far off the middle of the wheel axis a body may sit, as a standard deviation
 _FEWEST = 8  # arcs before anything is said
 _OUTLIER = 3.0  # standard deviations from which on an arc counts less
 _SURE = 4.0  # standard deviations by which anything said is off zero
@@ -91,14 +91,17 @@ def _with_arc(check: MountCheck, pose: Pose, turn: float, noise: PoseNoise) -> M
     dx, dy = pose.x - check.since.x, pose.y - check.since.y
     blur, twist = 2.0 * noise.position * noise.position, 2.0 * noise.heading * noise.heading
     square = dx * dx + dy * dy
-    moves = square > _CLEAR * _CLEAR * blur or turn * turn > _CLEAR * _CLEAR * twist
-    if not moves:
+    turns = turn * turn > _CLEAR * _CLEAR * twist
+    if not (turns or square > _CLEAR * _CLEAR * blur):
         return check
     middle = check.since.theta + 0.5 * turn
-    cos, sin, bend = math.cos(middle), math.sin(middle), 2.0 * math.sin(0.5 * turn)
+    cos, sin, whole = math.cos(middle), math.sin(middle), 2.0 * math.sin(0.5 * turn)
     ahead, aside = cos * dx + sin * dy, cos * dy - sin * dx
+    # Noise of place and heading may go together: a turn that may be noise tells no place, but hides one.
+    bend = whole if turns else 0.0
+    hidden = _LIKELY_PLACE * (whole - bend)
     # The mean of two headings has half the variance of one.
-    variance = blur + square * (0.25 * twist + _SLIP * _SLIP)
+    variance = blur + square * (0.25 * twist + _SLIP * _SLIP) + hidden * hidden
     left = mount_left(check)
     off = 0.0
     if left.known:
@@ -109,8 +112,7 @@ def _with_arc(check: MountCheck, pose: Pose, turn: float, noise: PoseNoise) -> M
     return check._replace(
         ahead_ahead=_MEMORY * check.ahead_ahead + share * ahead * ahead,
         ahead_turn=_MEMORY * check.ahead_turn - share * ahead * bend,
-        # Noise turns a robot that drives straight on, too.
-        turn_turn=_MEMORY * check.turn_turn + share * max(0.0, bend * bend - twist),
+        turn_turn=_MEMORY * check.turn_turn + share * bend * bend,
         ahead_aside=_MEMORY * check.ahead_aside - share * ahead * aside,
         turn_aside=_MEMORY * check.turn_aside + share * bend * aside,
         aside_aside=_MEMORY * check.aside_aside + share * aside * aside,

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from hil.emulator.lab_writer import LabWriter
-from hil.emulator.mocap import whole_ns
 from hil.emulator.plant import Plant
 from hil.emulator.robot import Robot
 from hil.emulator.world import CAPTURE, FRAME, NOTHING, SAMPLE, Happened
@@ -79,7 +78,6 @@ class EmulatorNode:
         self.names = (self.topics.leader, *(pair.follower for pair in self.pairs))
         self.writer = LabWriter(self.names, self.pairs)
         self.poses = chain_poses(scenario, len(self.names))
-        self.delayed = whole_ns(scenario.robot.odometry_delay_s) > 0
         self.orders = ordered_sides(scenario)
         self._handlers: dict[str, Callable[[EmulatorState, bytes, int], None]] = {
             **{pair.cmd_vel: partial(self._on_command, k) for k, pair in enumerate(self.pairs, start=1)},

@@ -17,8 +17,8 @@ from formation.pose import Motion, Pose
 from formation.records import Rows, part
 from hil.emulator.world import Lab, Memory, World
 from hil.nodes.controller_step import ControlRules, ControlState
-from hil.nodes.estimator_step import Known, Rules
-from hil.nodes.estimator_step import Memory as Tracks
+from hil.nodes.estimator_records import Known, Rules
+from hil.nodes.estimator_records import Memory as Tracks
 
 RUNNING, LANDED, STUCK, SHORT_OF_ROOM, SHORT_OF_NUMBERS = 0, 1, 2, 3, 4
 """Where a run stands: under way, over, its barrier closed for too long, and what it lacks to go on."""

@@ -44,7 +44,7 @@ from hil.nodes.control_rules import control_rules
 from hil.nodes.controller_step import ControlRules, ControlState, begun
 from hil.nodes.estimator_desk import NOTHING_KNOWN
 from hil.nodes.estimator_memory import HISTORY, WAYS, room_for, rules_of
-from hil.nodes.estimator_step import Known, Rules
+from hil.nodes.estimator_records import Known, Rules
 from hil.scenario.links import links_of
 from hil.scenario.ordered_sides import ordered_sides
 from hil.scenario.parts import station

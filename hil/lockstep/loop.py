@@ -64,7 +64,8 @@ from hil.nodes.controller_step import (
     heard_order,
     heard_stop,
 )
-from hil.nodes.estimator_step import Known, Rules
+from hil.nodes.estimator_records import Known, Rules
+from hil.nodes.own_motion_step import is_under_way, take_not_finite
 from hil.wire.message_checks import ACCEPTED, NOT_FINITE, check_odometry, place_cause, planar
 from hil.wire.records import Odometry as Message
 from hil.wire.records import Placement, stamp_of
@@ -228,7 +229,7 @@ def _heard(plan: Plan, rooms: Rooms, k: int, told: Odometry, now_ns: int) -> Non
     message = Message(True, stamp_of(now_ns), _placed(told.pose), told.motion.v, told.motion.u)
     motion = check_odometry(message, now_ns + CLOCK_TOLERANCE_NS)
     if motion.cause == NOT_FINITE:
-        store(rooms.knowns, k, estimator_step.take_not_finite(known, now_ns))
+        store(rooms.knowns, k, take_not_finite(known, now_ns))
     if motion.cause != ACCEPTED:
         return
     sample = OdometrySample(motion.stamp_ns, motion.v2, motion.u2, motion.has_pose, motion.pose)
@@ -331,7 +332,7 @@ def _estimator_tick(flight: Flight, plan: Plan, rooms: Rooms, k: int, now_ns: in
             waiting = 1
             clock = clock._replace(published_ns=now_ns)
     if not now_ns < clock.report_ns <= now_ns + _REPORT_NS:
-        well = clock.estimator_well or estimator_step.is_under_way(known, rules)
+        well = clock.estimator_well or is_under_way(known, rules)
         clock = clock._replace(report_ns=now_ns + _REPORT_NS, estimator_well=well)
     store(rooms.clocks, k, clock._replace(tick_ns=now_ns + _ESTIMATOR_TICK_NS))
     flight = _delivered(flight, plan, rooms, waiting, now_ns)

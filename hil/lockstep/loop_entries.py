@@ -29,7 +29,7 @@ from hil.lockstep.flight import (
 )
 from hil.lockstep.loop import flown
 from hil.nodes.controller_step import ControlRules, ControlState
-from hil.nodes.estimator_step import Known, Rules
+from hil.nodes.estimator_records import Known, Rules
 
 
 @entry

@@ -16,12 +16,13 @@ from estimation.own_motion.odometry_correction import (
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.time.host_time import HostTime
 from estimation.tracking.estimate import Estimate
+from estimation.tracking.mount_check import is_off
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE
 from formation.records import load
 from hil.nodes.certifying import Believed, certifying
 from hil.nodes.estimator_inputs import RESTARTED, SEEN, SET_BACK, TICK_NS
 from hil.nodes.estimator_memory import EstimatorMemory, node_rules
-from hil.nodes.estimator_step import AUTO, MOCAP, Known, is_under_way
+from hil.nodes.estimator_records import AUTO, MOCAP, Known
 from hil.nodes.findings import Findings, named_findings
 from hil.nodes.frame_time import clock_report
 from hil.nodes.leader_findings import leader_findings
@@ -29,6 +30,7 @@ from hil.nodes.mount_report import mount_findings, mount_problem, mount_report
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
 from hil.nodes.noise_report import is_refuted, noise_findings, noise_report, scale_of
 from hil.nodes.odometry_findings import odometry_findings
+from hil.nodes.own_motion_step import is_under_way
 from hil.nodes.process_report import process_report
 from hil.nodes.sensor_offsets import offsets_report
 from hil.scenario.files import refuse_unrunnable
@@ -226,8 +228,11 @@ class EstimatorNode:
         """Diagnostics: status of the track, inputs taken and refused."""
         known = state.memory.known
         problem = "" if is_under_way(known, self.rules.step) else self._missing(known)
-        problem = problem or mount_problem(known.mount_check, stops=self.rules.step.mounts.stops)
+        stops = self.rules.step.mounts.stops
+        problem = problem or mount_problem(known.mount_check, stops=stops)
         values: dict[str, object] = {"status": state.memory.status(now_ns).name.lower()}
+        if stops and values["status"] == "tracking" and is_off(known.mount_check):
+            values["status"] = "rejecting"
         values |= mount_report(known.mount_check)
         values |= clock_report(state.times, state.memory.desk.time)
         values |= (

@@ -20,7 +20,7 @@ from formation.kernel import kernel
 from formation.records import Buffer, Rows, load, store
 from formation.ring import EMPTY
 from hil.nodes.counting import Count
-from hil.nodes.estimator_step import Known, Memory, Rules
+from hil.nodes.estimator_records import Known, Memory, Rules
 from hil.nodes.frame_time import TimeRules
 from hil.nodes.receipt_list import with_receipt
 from hil.wire.assumed_errors import AssumedErrors

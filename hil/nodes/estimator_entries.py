@@ -16,7 +16,7 @@ from formation.kernel import entry, interpreted
 from formation.records import Rows, load
 from hil.nodes import estimator_inputs as inputs
 from hil.nodes.estimator_desk import Desk, NodeRules
-from hil.nodes.estimator_step import Known
+from hil.nodes.estimator_records import Known
 
 
 @entry

@@ -22,8 +22,9 @@ from formation.records import load, store
 from hil.nodes import estimator_step as step
 from hil.nodes.counting import count
 from hil.nodes.estimator_desk import Desk, NodeRules, Notes, TimedFrame, forget, forget_tracks, noted
-from hil.nodes.estimator_step import Known, Rules, Taken
+from hil.nodes.estimator_records import AUTO, Known, Rules, Taken
 from hil.nodes.frame_time import time_of
+from hil.nodes.own_motion_step import by_either_at, by_odometry, take_not_finite
 from hil.nodes.refusals import (
     BAD_RANGE,
     NO_BODY_FRONT_END,
@@ -144,7 +145,7 @@ def odometry_seen(desk: Desk, payload: bytes, digest: int, now_ns: int) -> int:
     motion = check_odometry(read_odometry(payload), now_ns + CLOCK_TOLERANCE_NS)
     if motion.cause == NOT_FINITE:
         count(desk.counts, ODOMETRY_NOT_FINITE)
-        store(desk.known, 0, step.take_not_finite(load(Known, desk.known, 0), now_ns))
+        store(desk.known, 0, take_not_finite(load(Known, desk.known, 0), now_ns))
         return came
     if motion.cause != NOT_REFUSED:
         count(desk.counts, motion.cause)
@@ -192,10 +193,10 @@ def _take_sighting(desk: Desk, known: Known, rules: Rules) -> Taken:
     """Take the sighting that was seen into the leader's track."""
     memory, sensor = desk.memory(), load(NodeRules, desk.rules, 0).sensor
     seen = load(Sighting, desk.sighting, 0)
-    if rules.source == step.AUTO:
-        motion = step.by_either_at(known, memory, rules, seen.capture_ns)
+    if rules.source == AUTO:
+        motion = by_either_at(known, memory, rules, seen.capture_ns)
     else:
-        motion = step.by_odometry(known, memory, rules, seen.capture_ns)
+        motion = by_odometry(known, memory, rules, seen.capture_ns)
     scale = known.noise.scale
     sd_range, sd_bearing = scale.range * sensor.sigma_range, scale.bearing * sensor.sigma_bearing
     measurement = measure_body(seen.capture_ns, seen.rho, seen.alpha2, sd_range, sd_bearing, motion)

@@ -37,7 +37,8 @@ from hil.nodes.estimator_desk import (
     SensorRules,
     TimedFrame,
 )
-from hil.nodes.estimator_step import AUTO, FUSED, MOCAP, ODOMETRY, Known, MountRules, Rules, Told, estimate
+from hil.nodes.estimator_records import AUTO, FUSED, MOCAP, ODOMETRY, Known, MountRules, Rules, Told
+from hil.nodes.estimator_step import estimate
 from hil.nodes.frame_time import time_rules
 from hil.nodes.node import Counts
 from hil.nodes.refusals import COUNTED, REFUSALS, TAKEN, TAKEN_FRAME

@@ -6,13 +6,8 @@ handed from step to step (:class:`Known`). Live daemons, lockstep, replay and sw
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from estimation.consistency.noise_estimate import (
-    NOISE_GIVEN,
     Moment,
-    NoiseEstimate,
-    NoiseLearning,
     is_another,
     noise_with_frame,
     noise_with_sighting,
@@ -22,7 +17,6 @@ from estimation.consistency.process_estimate import (
     MEMBERS,
     LearnedProcess,
     Member,
-    ProcessLearning,
     learn,
     learned_noise,
     restarted,
@@ -38,51 +32,19 @@ from estimation.models.measurement import (
     measure_world,
 )
 from estimation.own_motion.interval_motion import motion_between
-from estimation.own_motion.judged_odometry import age_of, aged, fresh_for, is_better, with_own_track
-from estimation.own_motion.odometry_check import (
-    POSE,
-    TRACK,
-    OdometryCheck,
-    OdometrySample,
-    WayEntry,
-    awaits_track,
-    source_of,
-    way_between,
-    with_sample,
-)
-from estimation.own_motion.odometry_history import (
-    Correction,
-    InputTrust,
-    MotionSample,
-    delay_ns,
-    follower_motion,
-    remember,
-    sample_at,
-    sample_place,
-)
-from estimation.own_motion.own_track import (
-    OwnNoise,
-    OwnPoint,
-    folded,
-    motion_of,
-    own_begun,
-    own_followed,
-    own_place,
-    own_point,
-    own_predicted,
-    own_reprocessed,
-)
-from estimation.tracking.estimate import Estimate, estimate_at, guessed_when_slow
+from estimation.own_motion.odometry_check import POSE, TRACK, OdometrySample, source_of, with_sample
+from estimation.own_motion.odometry_history import MotionSample, delay_ns, remember, sample_at, sample_place
+from estimation.own_motion.own_track import folded, motion_of, own_place, own_point, own_predicted
+from estimation.tracking.estimate import estimate_at, guessed_when_slow
 from estimation.tracking.follower_check import BELIEVED, MOUNT
 from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
 from estimation.tracking.follower_check import GATED as LEADER_OFF
-from estimation.tracking.mount_check import MountCheck, is_off
+from estimation.tracking.mount_check import is_off
 from estimation.tracking.mount_check import watched as mount_watched
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE, RESTARTED, USED, TrackPoint
 from estimation.tracking.tracker import (
     REJECTING,
     TRACKING,
-    TrackSettings,
     add,
     capture_at,
     newest,
@@ -92,97 +54,35 @@ from estimation.tracking.tracker import (
     status_of,
     with_motion,
 )
-from estimation.tracking.travel_watch import TravelWatch, watched
+from estimation.tracking.travel_watch import watched
 from formation.kernel import kernel
-from formation.mount import NO_MOUNT, Mount, robot_pose
+from formation.mount import robot_pose
 from formation.records import Rows, load, store
-from formation.ring import Ring, place
+from formation.ring import place
+from hil.nodes.estimator_records import (
+    AUTO,
+    FUSED,
+    MOCAP,
+    ODOMETRY,
+    Known,
+    Memory,
+    MountRules,
+    Rules,
+    Taken,
+    Told,
+)
+from hil.nodes.own_motion_step import (
+    by_either,
+    by_either_at,
+    by_odometry,
+    by_pose,
+    due_pose,
+    is_fresh,
+    judged_odometry,
+    own_again,
+)
 
 _NS = 1e-9
-
-ODOMETRY, MOCAP, FUSED, AUTO = 0, 1, 2, 3
-"""Where the follower's motion is known from; AUTO: from odometry while nothing speaks against it."""
-
-
-class MountRules(NamedTuple):
-    """Where the follower's body sits, and whether it is stopped if that is plainly wrong."""
-
-    follower: Mount
-    stops: bool
-
-
-NO_MOUNT_RULES = MountRules(NO_MOUNT, stops=False)
-
-
-class Rules(NamedTuple):
-    """All that is fixed about an estimator.
-
-    source: where the follower's motion is from. reprocesses: whether odometry that comes late is folded in
-    again. span: seconds of odometry kept. noise: of a mocap pose. mounts: of the follower's
-    body. noise_learning: by what the noise is put right.
-    """
-
-    settings: TrackSettings
-    filter: Filter
-    source: int
-    reprocesses: bool
-    span: float
-    noise: PoseNoise
-    trust: InputTrust
-    own_noise: OwnNoise
-    process_learning: ProcessLearning
-    mounts: MountRules = NO_MOUNT_RULES
-    noise_learning: NoiseLearning = NOISE_GIVEN
-
-
-class Memory(NamedTuple):
-    """Rows that an estimator works in: the leader's track, odometry, the follower's own track, and more.
-
-    By the ``ways`` that both have gone odometry is judged. ``bank``: filters of other process noise, by which
-    that is found.
-    """
-
-    points: Rows[TrackPoint]
-    history: Rows[MotionSample]
-    own: Rows[OwnPoint]
-    ways: Rows[WayEntry]
-    bank: Rows[Member]
-
-
-class Known(NamedTuple):
-    """Where the rows are filled, by what odometry is corrected, and how far it is believed.
-
-    ``watched_ns``: capture of the first frame since when odometry is missed, 0 before. ``noise``: of
-    measurements, as they tell it. ``process``: what is known of how the leader drives. ``travel``: which
-    way the leader went, where it is seen in the world. ``mount_check``: what is left of the follower's mount.
-    """
-
-    track: Ring
-    odometry: Ring
-    own: Ring
-    correction: Correction
-    odometry_check: OdometryCheck
-    watched_ns: int
-    noise: NoiseEstimate
-    process: LearnedProcess
-    travel: TravelWatch
-    mount_check: MountCheck
-
-
-class Taken(NamedTuple):
-    """What became of a frame or sighting: verdict and cause; ``late``: captured before the newest."""
-
-    known: Known
-    verdict: int
-    cause: int
-    late: bool
-
-
-class Told(NamedTuple):
-    """An estimate, and why the newest measurement was not used."""
-
-    estimate: Estimate
-    cause: int
 
 
 @kernel
@@ -192,94 +92,6 @@ def with_robot(seen: PairSeen, rules: MountRules) -> PairSeen:
     The leader's stays its body's, which only the filter knows how to tell from the leader.
     """
     return seen._replace(follower=robot_pose(seen.follower, rules.follower))
-
-
-@kernel
-def by_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
-    """Motion of the follower as odometry tells it, put right where that is known to be wrong."""
-    return follower_motion(memory.history, known.odometry, capture_ns, rules.trust, known.correction)
-
-
-@kernel
-def due_pose(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> OwnPoint:
-    """The follower's pose, ready to be folded into its own track, with odometry if that is fused."""
-    told = rules.source == FUSED and known.odometry.length > 0
-    odometry = FollowerMotion(0.0, 0.0, 0.0, 0.0)
-    if told:
-        odometry = by_odometry(known, memory, rules, capture_ns)
-    return own_begun(capture_ns, seen.follower, told, odometry, rules.own_noise)
-
-
-@kernel
-def by_pose(before: OdometrySample, after: OdometrySample) -> MotionSample:
-    """Mean motion from one pose of odometry to the next, in the middle between them."""
-    span_ns = after.stamp_ns - before.stamp_ns
-    if span_ns <= 0:
-        return MotionSample(after.stamp_ns, after.v2, after.u2)
-    way, dt = way_between(before.pose, after.pose), span_ns * _NS
-    return MotionSample(before.stamp_ns + span_ns // 2, way.v / dt, way.u / dt)
-
-
-@kernel
-def _trust(known: Known, rules: Rules) -> InputTrust:
-    """What is known of odometry, its delay as it is corrected."""
-    return rules.trust._replace(delay=rules.trust.delay + known.correction.delay)
-
-
-@kernel
-def _fresh_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
-    """Motion by odometry that is believed, as old as it is; by nothing at all if there is none to believe."""
-    motion, check = by_odometry(known, memory, rules, capture_ns), known.odometry_check
-    if source_of(check) == TRACK or not check.heard:
-        return motion._replace(sd_v2=rules.own_noise.v_max, sd_u2=rules.own_noise.u_max)
-    return aged(motion, check, age_of(check, capture_ns, _trust(known, rules)), rules.own_noise)
-
-
-@kernel
-def _is_fresh(known: Known, rules: Rules, capture_ns: int) -> bool:
-    """Whether odometry is believed and covers a capture."""
-    check = known.odometry_check
-    age = age_of(check, capture_ns, _trust(known, rules))
-    return check.heard and source_of(check) != TRACK and age <= fresh_for(check)
-
-
-@kernel
-def by_either(known: Known, memory: Memory, rules: Rules, due: OwnPoint) -> FollowerMotion:
-    """Motion at a pose that is due: by odometry while that is fresh, else by what is known better."""
-    motion = _fresh_odometry(known, memory, rules, due.capture_ns)
-    if _is_fresh(known, rules, due.capture_ns):
-        return motion
-    own = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
-    return own if is_better(own, motion, rules.own_noise) else motion
-
-
-@kernel
-def by_either_at(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
-    """The same at a point of the follower's own track, which may not have it."""
-    motion = _fresh_odometry(known, memory, rules, capture_ns)
-    if _is_fresh(known, rules, capture_ns):
-        return motion
-    at = own_place(memory.own, known.own, capture_ns)
-    if at == known.own.length:
-        return motion
-    point = own_point(memory.own, known.own, at)
-    own = motion_of(point)
-    return own if point.capture_ns == capture_ns and is_better(own, motion, rules.own_noise) else motion
-
-
-@kernel
-def _judged(known: Known, memory: Memory, rules: Rules) -> OdometryCheck:
-    """Odometry's check with what the follower's own track has to say."""
-    check = known.odometry_check
-    if not awaits_track(check):
-        return check
-    return with_own_track(check, memory.ways, memory.own, known.own, rules.own_noise, _trust(known, rules))
-
-
-@kernel
-def take_not_finite(known: Known, now_ns: int) -> Known:
-    """Take note of odometry that came with a number that is none."""
-    return known._replace(odometry_check=known.odometry_check._replace(bad_ns=now_ns))
 
 
 @kernel
@@ -368,7 +180,7 @@ def _take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, see
         reprocessed(memory.points, after.track, first, rules.settings, rules.filter)
     if rules.source == AUTO:
         since_ns = after.watched_ns if after.watched_ns > 0 else capture_ns
-        after = after._replace(odometry_check=_judged(after, memory, rules), watched_ns=since_ns)
+        after = after._replace(odometry_check=judged_odometry(after, memory, rules), watched_ns=since_ns)
     return taken._replace(known=after)
 
 
@@ -390,7 +202,7 @@ def _with_way(known: Known, memory: Memory, rules: Rules, measurement: Measureme
         return measurement
     to_ns = measurement.capture_ns
     by_sample = rules.source == ODOMETRY or not measurement.framed
-    if not by_sample and (rules.source != AUTO or not _is_fresh(known, rules, to_ns)):
+    if not by_sample and (rules.source != AUTO or not is_fresh(known, rules, to_ns)):
         return measurement._replace(has_way=False)
     from_ns = capture_at(memory.points, known.track, k - 1)
     if from_ns >= to_ns:
@@ -456,7 +268,10 @@ def take_odometry(known: Known, memory: Memory, rules: Rules, told: OdometrySamp
         check = with_sample(check, memory.ways, told, rules.own_noise)
         known = known._replace(odometry_check=check)
         if known.own.length > 0:
-            known = known._replace(odometry_check=_judged(known, memory, rules))
+            seen = rules
+            if rules.noise_learning.learns:
+                seen = with_noise(rules, scaled_noise(rules.noise, known.noise))
+            known = known._replace(odometry_check=judged_odometry(known, memory, seen))
     ring = remember(memory.history, known.odometry, sample, rules.span)
     known = known._replace(odometry=ring)
     n = known.track.length
@@ -470,7 +285,7 @@ def take_odometry(known: Known, memory: Memory, rules: Rules, told: OdometrySamp
         return known
     first = place_of(memory.points, known.track, since_ns)
     if rules.source == FUSED:
-        _own_again(known, memory, rules, since_ns)
+        own_again(known, memory, rules, since_ns)
         changed = _with_own_motion(known, memory, rules, first)
     else:
         changed = _with_odometry(known, memory, rules, first)
@@ -534,28 +349,6 @@ def _put_measurement(known: Known, memory: Memory, k: int, measurement: Measurem
 @kernel
 def _same_motion(a: FollowerMotion, b: FollowerMotion) -> bool:
     return a.v2 == b.v2 and a.u2 == b.u2 and a.sd_v2 == b.sd_v2 and a.sd_u2 == b.sd_u2
-
-
-@kernel
-def _own_again(known: Known, memory: Memory, rules: Rules, since_ns: int) -> None:
-    """Fold the follower's own track anew from a time on, with the odometry that is now known at its poses."""
-    ring, noise = known.own, rules.own_noise
-    first = max(1, own_place(memory.own, ring, since_ns))
-    for k in range(first, ring.length):
-        due = own_point(memory.own, ring, k)
-        due = own_reprocessed(due, by_odometry(known, memory, rules, due.capture_ns), noise)
-        point = own_followed(own_point(memory.own, ring, k - 1), due, noise)
-        store(memory.own, place(ring, memory.own, k), point)
-
-
-@kernel
-def is_under_way(known: Known, rules: Rules) -> bool:
-    """Whether there is all that estimates rest on: the leader's track, and motion of the follower."""
-    if known.track.length == 0:
-        return False
-    if rules.source == MOCAP:
-        return known.own.length > 0
-    return known.odometry.length > 0 or (rules.source == AUTO and known.own.length > 0)
 
 
 @kernel

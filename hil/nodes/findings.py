@@ -21,7 +21,7 @@ ADVICE = {
     "odometry_silent": "see that the robot publishes odometry on the topic that the scenario names",
     "odometry_contradicts": "check the odometry's scale, signs and topic, and whether the wheels slip",
     "odometry_not_finite": "look at the driver that publishes it: what is no number is not used",
-    "odometry_late": "check the clock of the robot and its link, or set robot.odometry_delay_s",
+    "odometry_late": "check the clock of the robot and its link, or set estimator.align_odometry = true",
     "odometry_reset": "find out what restarted the robot's base; its pose counts from a new origin now",
     "frame_yaw": "set follower.mount to what abreast calibrate prints, or turn the body to the front",
     "frame_pivot": "set the mount to what abreast calibrate prints, or its pivot between the wheels",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from estimation.own_motion.odometry_check import POSE, TRACK, OdometryCheck, Sums, source_of
-from hil.nodes.estimator_step import AUTO, Known, Rules
+from hil.nodes.estimator_records import AUTO, Known, Rules
 
 FINDING = "finding."
 """What the names of findings begin with among the values of a node's diagnostics."""
@@ -100,7 +100,7 @@ def _off(channel: str, sums: Sums) -> str:
     if sums.told < _NOTHING * _NOTHING * sums.shown:
         return f"a {channel} of zero though the robot moves"
     alike = abs(sums.both) / (sums.told * sums.shown) ** 0.5
-    if alike < _ALIKE:
+    if alike < _ALIKE or abs(factor - 1.0) < _NOTHING:
         return f"a {channel} that does not fit the motion"
     if factor < 0.0:
         return f"a {channel} reversed" + (f", scaled by {-factor:.2f}" if abs(factor + 1.0) > 0.1 else "")

@@ -45,8 +45,8 @@ def import_mrclam(
     to its time and left out where it was not seen; ``rows`` counts frames. ``sightings`` camera: the
     follower's own, range and bearing of the leader's bar code; ``rows`` counts these, and the tracks are
     nothing but truth. The scenario is the shipped ``mrclam`` or ``mrclam-camera``, judged from 5 s after the
-    beginning on. The truth is the same tracks smoothed by :func:`smoothed_motion`. Raises :class:`UsageError` as
-    :func:`read_pair`, before anything is written, and if ``out`` exists or cannot be created. No half log is
+    beginning on. The truth is the same tracks smoothed by :func:`smoothed_motion`. Raises
+    :class:`UsageError` as :func:`read_pair`, before anything is written, and if ``out`` exists or cannot be created. No half log is
     left behind.
     """
     pair = read_pair(folder, leader, follower, sighted=sightings == "camera")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -97,6 +97,9 @@ def mounts_of_events(
 ) -> Mounts:
     """The same by messages of ours; times count from the first odometry unless they are ``absolute``."""
     tracks = body_tracks(events, scenario)
+    if scenario.estimator.input_lag_s > 0.0:
+        # Commands stand in for odometry: they say what was wanted of the wheels, not what these did.
+        tracks = replace(tracks, follower_speed={})
     motions = tracks.follower_speed or tracks.leader_speed
     zero_ns = 0 if absolute else min(motions or tracks.follower, default=0)
     begin_ns = -1 if from_s is None else zero_ns + round(from_s * 1e9)

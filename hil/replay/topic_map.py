@@ -41,7 +41,8 @@ class TopicNames(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     world frame. ``odometry``: motion of the follower, Odometry or TwistStamped; without it the follower's own
     poses tell its motion. ``sighting``: the leader as the follower sees it, our RangeBearing, or PoseStamped
     or PointStamped of the leader in the follower's own frame (x ahead, y to the left); ``leader_sighting`` is
-    another name for it. ``stamps``: ``log`` takes the time of logging for the time of capture, where the stamps of the sources come from different clocks.
+    another name for it. ``stamps``: ``log`` takes the time of logging for the time of capture, where the
+    stamps of the sources come from different clocks.
     ``pair_within_s``: how far apart in time two poses may be to make a frame.
     """
 

@@ -9,12 +9,13 @@ from typing import Any
 
 from controllers.gain_design import Design, design
 from controllers.gain_task import Task
+from estimation.bounds.certificate import rates_claim
 from formation.invariant_set import Disturbed, invariant_set
 from formation.shape import ABREAST_ALPHA2
 from formation.spacing import Spacing
 from hil.errors import UsageError
 from hil.log.report_json import known
-from hil.scenario.certificate import assumptions_of, certificate_of
+from hil.scenario.certificate import assumptions_of
 from hil.scenario.leader_model import process_noise
 from hil.scenario.parts import limits
 from hil.scenario.schema import Scenario
@@ -52,7 +53,7 @@ def task_of(scenario: Scenario) -> Task:
         sd_alpha1=math.hypot(sd_v1 / slow, across),
         sd_rho=math.sqrt(2.0) * sigma if world else given.sigma_range,
         sd_alpha2=math.hypot(given.sigma_heading, across) if world else given.sigma_bearing,
-        M_alpha2=certificate_of(scenario).claims()["rates"].figures["M_alpha2"],
+        M_alpha2=rates_claim(assumptions).figures["M_alpha2"],
     )
 
 

@@ -64,7 +64,7 @@ def test_the_worst_motion_by_another_integrator_comes_near_the_edge_from_within(
     rho, theta = np.concatenate([first, second], axis=1)
     assert np.all(inside.contains(rho, theta + ABREAST_ALPHA1, 1e-6))
     assert rho.min() < inside.rho_min + 0.002
-    assert rho.max() > inside.rho_max - 0.002
+    assert rho.max() > inside.rho_max - 0.005
     assert theta.max() > inside.alpha1_max - ABREAST_ALPHA1 - 0.2
 
 

@@ -44,6 +44,11 @@ FAULTS = (
     ' {kind="swap", at_s=0.1, duration_s=0.03}, {kind="dropout", at_s=0.2, duration_s=0.02},'
     ' {kind="step", at_s=0.15, body="follower", duration_s=0.2}]'
 )
+LYING = (
+    'robot.odometry_faults=[{kind="scale", at_s=0.05, duration_s=0.1}, {kind="slip", at_s=0.05},'
+    ' {kind="reversed", at_s=0.1}, {kind="reset", at_s=0.15}, {kind="delay", at_s=0.2, delay_s=0.05},'
+    ' {kind="zero", at_s=0.3}, {kind="nan", at_s=0.35}, {kind="silent", at_s=0.4}]'
+)
 LOOSE = ["mocap.jitter_s=0.02", "mocap.loss=0.2", "robot.odometry_delay_s=0.017", "mocap.clock_drift_ppm=300"]
 
 
@@ -89,7 +94,7 @@ class World3:
 
 @pytest.mark.parametrize("program", [SINUSOID, TABLE])
 def test_compiled_and_plain_give_the_same_bits(program: str) -> None:
-    scenario = load_scenario("turtlebot3", [f"leader.program={program}", FAULTS, *LOOSE])
+    scenario = load_scenario("turtlebot3", [f"leader.program={program}", FAULTS, LYING, *LOOSE])
     fast, plain = (World3(scenario, compiled=compiled) for compiled in (True, False))
     happened = fast.run()
     assert happened == plain.run()

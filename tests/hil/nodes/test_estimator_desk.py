@@ -12,7 +12,7 @@ from formation.ring import EMPTY, Ring
 from hil.nodes.estimator import EstimatorNode
 from hil.nodes.estimator_desk import NOTHING_KNOWN, Desk, forget, forget_tracks, noted
 from hil.nodes.estimator_memory import EstimatorMemory
-from hil.nodes.estimator_step import Known, Memory
+from hil.nodes.estimator_records import Known, Memory
 from hil.scenario.files import load_scenario
 
 NOW_NS = 1_000_000_000_000

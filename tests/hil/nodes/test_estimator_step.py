@@ -32,7 +32,8 @@ from hil.nodes import estimator_inputs as inputs
 from hil.nodes.estimator_desk import Desk, NodeRules, Notes, SensorRules, TimedFrame
 from hil.nodes.estimator_entries import COMPILED, PLAIN
 from hil.nodes.estimator_memory import EstimatorMemory
-from hil.nodes.estimator_step import AUTO, FUSED, MOCAP, ODOMETRY, Known, Rules, Told, estimate
+from hil.nodes.estimator_records import AUTO, FUSED, MOCAP, ODOMETRY, Known, Rules, Told
+from hil.nodes.estimator_step import estimate
 from hil.nodes.frame_time import TimeRules
 from hil.nodes.status_reasons import ALL_REASONS
 from hil.scenario.files import load_scenario

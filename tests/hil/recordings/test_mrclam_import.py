@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from formation.pose import Pose, advance
+from formation.shape import shape_of
 from hil.command_line import main
 from hil.errors import UsageError
 from hil.judge.replay_verdict import run_data_of_replay
@@ -19,7 +20,7 @@ from hil.replay.odometry_alignment import judge_own_motion
 from hil.replay.rerun import replay
 from hil.scenario.files import load_scenario, with_overrides
 from hil.wire import topics
-from hil.wire.message_types import Odometry, RigidBodies, Truth
+from hil.wire.message_types import Odometry, RangeBearing, RigidBodies, Truth
 from hil.wire.messages import decode_as, to_ns
 
 REAL = "ABREAST_REAL"
@@ -126,6 +127,49 @@ def test_the_command_imports_and_says_how_to_go_on(
         main([*arguments, str(tmp_path / "pair.mcap")])
     assert refused.value.code == 2
     assert "exists already" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def sighted(folder: Path) -> Path:
+    """The same, and what robot 5's camera saw four times a second: robot 3 and a landmark."""
+    generator = np.random.default_rng(3)
+    (folder / "Barcodes.dat").write_text("# Subject Barcode\n 3 41\n 5 23\n 6 72\n")
+    rows = ["# Time Barcode range bearing"]
+    for k in range(40):
+        t = 0.25 * k
+        leader, own = advance(Pose(0.0, 0.0, 0.5), *LEADS, t), advance(Pose(1.0, 0.5, 1.0), *FOLLOWS, t)
+        true, shake = shape_of(leader, own), generator.normal(size=2) * [0.01, 0.005]
+        rows.append(f"{START_S + t:.3f} 72 2.000 0.100")
+        rows.append(f"{START_S + t:.3f} 41 {true.rho + shake[0]:.4f} {true.alpha2 + shake[1]:.4f}")
+    (folder / "Robot5_Measurement.dat").write_text("\n".join(rows))
+    return folder
+
+
+def test_a_camera_sees_its_leader_by_the_bar_code_and_vicon_is_the_truth(sighted: Path) -> None:
+    out = sighted / "camera.mcap"
+    done = import_mrclam(sighted, 3, 5, out, "camera")
+    assert done.rows == 40
+    log = read_log(out)
+    scenario = scenario_of(log)
+    assert scenario is not None
+    assert (scenario.name, scenario.estimator.front_end) == ("mrclam-camera", "body")
+    assert topics.RIGID_BODIES not in log.topics
+    seen = [decode_as(record.payload, RangeBearing) for record in log.records(["robot5/leader_sighting"])]
+    assert len(seen) == 40
+    true = shape_of(Pose(0.0, 0.0, 0.5), Pose(1.0, 0.5, 1.0))
+    assert (seen[0].rho, seen[0].alpha2) == (
+        pytest.approx(true.rho, abs=0.05),
+        pytest.approx(true.alpha2, abs=0.02),
+    )
+    at_ns = {to_ns(decode_as(record.payload, Truth).header.stamp) for record in log.records([topics.TRUTH])}
+    assert {to_ns(each.header.stamp) for each in seen} <= at_ns
+
+
+def test_a_leader_that_no_camera_saw_is_named(sighted: Path) -> None:
+    (sighted / "Robot3_Measurement.dat").write_text(f"{START_S} 72 2.0 0.1\n")
+    with pytest.raises(UsageError, match=r"robot 3 never saw robot 5 \(bar code 23\)"):
+        import_mrclam(sighted, 5, 3, sighted / "unseen.mcap", "camera")
+    assert not (sighted / "unseen.mcap").exists()
 
 
 def test_nothing_is_left_behind_by_a_folder_that_is_refused(folder: Path, tmp_path: Path) -> None:

@@ -36,6 +36,9 @@ CASES: dict[str, tuple[str, ...]] = {
     "own clock": (*ROUGH, "mocap.clock_offset_s=3.0", "estimator.clock=estimated"),
     "fused": ("estimator.own_motion=fused", 'mocap.faults=[{kind="freeze", at_s=1.0, duration_s=0.3}]'),
     "body": ("estimator.front_end=body", "controller.command_type=Twist"),
+    "zero odometry": ('robot.odometry_faults=[{kind="zero", at_s=0.2}]', "mocap.jitter_s=0.02"),
+    "silent odometry": ('robot.odometry_faults=[{kind="silent", at_s=0.5}]', "estimator.front_end=body"),
+    "nan in odometry": ('robot.odometry_faults=[{kind="nan", at_s=0.5}]',),
     "coasting": ("mocap.loss=0.97",),
     "told": ("controller.law=ideal", "formation.change_sides_at_s=[1.0]"),
 }

@@ -45,11 +45,14 @@ def test_a_leader_that_backs_up_moves_as_one_that_faces_the_other_way() -> None:
 
 
 def test_the_noise_free_pair_is_the_same_either_way() -> None:
-    cases = (FORWARDS, False), (BACKWARDS, True)
-    there, back = (simulate(pair(program, turned=turned), None) for program, turned in cases)
-    np.testing.assert_allclose(back.rho, there.rho, atol=1e-9)
-    np.testing.assert_allclose(wrap(back.alpha1 - there.alpha1), 0.0, atol=1e-9)
-    assert np.all(back.v[:, 0] > 0.0)
+    there, back = (
+        simulate(pair(program, turned=turned), None)
+        for program, turned in ((FORWARDS, False), (BACKWARDS, True))
+    )
+    for name in ("rho", "alpha1", "v"):
+        forwards, backwards = (np.asarray(getattr(run, name)) for run in (there, back))
+        np.testing.assert_allclose(wrap(backwards - forwards), 0.0, atol=1e-9)
+    assert np.all(np.asarray(back.v)[:, 0] > 0.0)
 
 
 def test_a_leader_that_turns_back_is_refused_in_one_line(tmp_path: Path) -> None:

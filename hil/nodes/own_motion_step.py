@@ -1,0 +1,142 @@
+"""The follower's own motion at a step of the estimator: by odometry, its track, or what is right."""
+
+from __future__ import annotations
+
+from estimation.models.coordinated_turn import FollowerMotion
+from estimation.models.measurement import PairSeen
+from estimation.own_motion.judged_odometry import age_of, aged, fresh_for, is_better, with_own_track
+from estimation.own_motion.odometry_check import (
+    TRACK,
+    OdometryCheck,
+    OdometrySample,
+    awaits_track,
+    source_of,
+    way_between,
+)
+from estimation.own_motion.odometry_history import InputTrust, MotionSample, follower_motion
+from estimation.own_motion.own_track import (
+    OwnPoint,
+    motion_of,
+    own_begun,
+    own_followed,
+    own_place,
+    own_point,
+    own_predicted,
+    own_reprocessed,
+)
+from formation.kernel import kernel
+from formation.records import store
+from formation.ring import place
+from hil.nodes.estimator_records import AUTO, FUSED, MOCAP, Known, Memory, Rules
+
+_NS = 1e-9
+
+
+@kernel
+def by_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
+    """Motion of the follower as odometry tells it, put right where that is known to be wrong."""
+    return follower_motion(memory.history, known.odometry, capture_ns, rules.trust, known.correction)
+
+
+@kernel
+def due_pose(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> OwnPoint:
+    """The follower's pose, ready to be folded into its own track, with odometry if that is fused."""
+    told = rules.source == FUSED and known.odometry.length > 0
+    odometry = FollowerMotion(0.0, 0.0, 0.0, 0.0)
+    if told:
+        odometry = by_odometry(known, memory, rules, capture_ns)
+    return own_begun(capture_ns, seen.follower, told, odometry, rules.own_noise)
+
+
+@kernel
+def by_pose(before: OdometrySample, after: OdometrySample) -> MotionSample:
+    """Mean motion from one pose of odometry to the next, in the middle between them."""
+    span_ns = after.stamp_ns - before.stamp_ns
+    if span_ns <= 0:
+        return MotionSample(after.stamp_ns, after.v2, after.u2)
+    way, dt = way_between(before.pose, after.pose), span_ns * _NS
+    return MotionSample(before.stamp_ns + span_ns // 2, way.v / dt, way.u / dt)
+
+
+@kernel
+def _trust(known: Known, rules: Rules) -> InputTrust:
+    """What is known of odometry, its delay as it is corrected."""
+    return rules.trust._replace(delay=rules.trust.delay + known.correction.delay)
+
+
+@kernel
+def _fresh_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
+    """Motion by odometry that is believed, as old as it is; by nothing at all if there is none to believe."""
+    motion, check = by_odometry(known, memory, rules, capture_ns), known.odometry_check
+    if source_of(check) == TRACK or not check.heard:
+        return motion._replace(sd_v2=rules.own_noise.v_max, sd_u2=rules.own_noise.u_max)
+    return aged(motion, check, age_of(check, capture_ns, _trust(known, rules)), rules.own_noise)
+
+
+@kernel
+def is_fresh(known: Known, rules: Rules, capture_ns: int) -> bool:
+    """Whether odometry is believed and covers a capture."""
+    check = known.odometry_check
+    age = age_of(check, capture_ns, _trust(known, rules))
+    return check.heard and source_of(check) != TRACK and age <= fresh_for(check)
+
+
+@kernel
+def by_either(known: Known, memory: Memory, rules: Rules, due: OwnPoint) -> FollowerMotion:
+    """Motion at a pose that is due: by odometry while that is fresh, else by what is known better."""
+    motion = _fresh_odometry(known, memory, rules, due.capture_ns)
+    if is_fresh(known, rules, due.capture_ns):
+        return motion
+    own = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
+    return own if is_better(own, motion, rules.own_noise) else motion
+
+
+@kernel
+def by_either_at(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
+    """The same at a point of the follower's own track, which may not have it."""
+    motion = _fresh_odometry(known, memory, rules, capture_ns)
+    if is_fresh(known, rules, capture_ns):
+        return motion
+    at = own_place(memory.own, known.own, capture_ns)
+    if at == known.own.length:
+        return motion
+    point = own_point(memory.own, known.own, at)
+    own = motion_of(point)
+    return own if point.capture_ns == capture_ns and is_better(own, motion, rules.own_noise) else motion
+
+
+@kernel
+def judged_odometry(known: Known, memory: Memory, rules: Rules) -> OdometryCheck:
+    """Odometry's check with what the follower's own track has to say."""
+    check = known.odometry_check
+    if not awaits_track(check):
+        return check
+    return with_own_track(check, memory.ways, memory.own, known.own, rules.own_noise, _trust(known, rules))
+
+
+@kernel
+def take_not_finite(known: Known, now_ns: int) -> Known:
+    """Take note of odometry that came with a number that is none."""
+    return known._replace(odometry_check=known.odometry_check._replace(bad_ns=now_ns))
+
+
+@kernel
+def own_again(known: Known, memory: Memory, rules: Rules, since_ns: int) -> None:
+    """Fold the follower's own track anew from a time on, with the odometry that is now known at its poses."""
+    ring, noise = known.own, rules.own_noise
+    first = max(1, own_place(memory.own, ring, since_ns))
+    for k in range(first, ring.length):
+        due = own_point(memory.own, ring, k)
+        due = own_reprocessed(due, by_odometry(known, memory, rules, due.capture_ns), noise)
+        point = own_followed(own_point(memory.own, ring, k - 1), due, noise)
+        store(memory.own, place(ring, memory.own, k), point)
+
+
+@kernel
+def is_under_way(known: Known, rules: Rules) -> bool:
+    """Whether there is all that estimates rest on: the leader's track, and motion of the follower."""
+    if known.track.length == 0:
+        return False
+    if rules.source == MOCAP:
+        return known.own.length > 0
+    return known.odometry.length > 0 or (rules.source == AUTO and known.own.length > 0)
