@@ -83,7 +83,7 @@ class LearnedProcess(NamedTuple):
 
     speed, turn: ratios of q_v and q_u to what is told. settled_ns: since when the track is settled, 0 if it
     is not. begun: whether the bank runs. at_ns: time of its beliefs. ended_ns: capture of the last
-    measurement in them; motion: of the follower then. count, later_ns, x, y: number of measurements put
+    measurement in them; motion: of the follower then. together, later_ns, x, y: number of measurements put
     together since, the sum of their times after ``ended_ns``, and sums of positions. way_s, way:
     time [s] since ``ended_ns`` over which the follower's way is known, and the sums of its motion over that,
     its variances times time.
@@ -96,7 +96,7 @@ class LearnedProcess(NamedTuple):
     at_ns: int
     ended_ns: int
     motion: FollowerMotion
-    count: int
+    together: int
     later_ns: int
     x: float
     y: float
@@ -124,13 +124,13 @@ def learn(
     if not learned.begun:
         return _waiting(learned, bank, measurement, belief, settled)
     since_ns = now_ns - learned.ended_ns
-    count, later_ns = learned.count + 1, learned.later_ns + since_ns
+    count, later_ns = learned.together + 1, learned.later_ns + since_ns
     x, y = learned.x + measurement.x, learned.y + measurement.y
     if not measurement.in_world:
         # Along the follower's axes, which turn, positions of different times have no mean.
         count, later_ns, x, y = 1, since_ns, measurement.x, measurement.y
     learned = _with_way(learned, point)
-    learned = learned._replace(count=count, later_ns=later_ns, x=x, y=y)
+    learned = learned._replace(together=count, later_ns=later_ns, x=x, y=y)
     if since_ns < _INTERVAL_NS:
         return learned
     return _scored(learned, bank, measurement, belief, rules, estimator)
@@ -190,7 +190,7 @@ def _waiting(
         at_ns=now_ns,
         ended_ns=now_ns,
         motion=measurement.motion,
-        count=0,
+        together=0,
         later_ns=0,
         x=0.0,
         y=0.0,
@@ -209,8 +209,8 @@ def _scored(
     estimator: Filter,
 ) -> LearnedProcess:
     """Score every member by what was put together, and take the noise that is likeliest then."""
-    many = 1.0 * learned.count
-    x, y, due_ns = learned.x / many, learned.y / many, learned.ended_ns + learned.later_ns // learned.count
+    many = 1.0 * learned.together
+    x, y, due_ns = learned.x / many, learned.y / many, learned.ended_ns + learned.later_ns // learned.together
     given = measurement.spread
     spread = Spread(given.xx / many, given.xy / many, given.yy / many)
     dt = (due_ns - learned.at_ns) * _NS
@@ -232,7 +232,7 @@ def _scored(
         at_ns=due_ns,
         ended_ns=measurement.capture_ns,
         motion=measurement.motion,
-        count=0,
+        together=0,
         later_ns=0,
         x=0.0,
         y=0.0,

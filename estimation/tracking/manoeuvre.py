@@ -26,7 +26,7 @@ ALARM = 9.0
 LASTS = 0.15
 """How long [s] the noise stays raised after an alarm: about as long as a robot's actuators take."""
 
-REMEMBERED = 30.0
+REMEMBERED = 20.0
 """Time [s] in which it is forgotten that a leader makes jumps."""
 
 SPEED_RAISED, TURN_RAISED = 0.3, 1.0
@@ -89,9 +89,7 @@ def later(manoeuvre: Manoeuvre, dt: float) -> Manoeuvre:
 @kernel
 def raised(noise: ProcessNoise, manoeuvre: Manoeuvre, limits: LeaderLimits) -> ProcessNoise:
     """Process noise of a leader that makes jumps, or just now seems to."""
-    # Squared, since speed noise that a false alarm leaves behind costs more than that of turning.
-    sure = manoeuvre.speed_jumps * manoeuvre.speed_jumps
-    speed, turn = SPEED_JUMPY * sure, TURN_JUMPY * manoeuvre.turn_jumps
+    speed, turn = SPEED_JUMPY * manoeuvre.speed_jumps, TURN_JUMPY * manoeuvre.turn_jumps
     if manoeuvre.speed_raised > 0.0:
         speed = SPEED_RAISED
     if manoeuvre.turn_raised > 0.0:

@@ -96,7 +96,7 @@ def test_what_is_raised_falls_back_and_that_a_leader_jumps_is_forgotten_slowly()
     manoeuvre, _ = after([(2.0, 2.0)] * 7)
     soon, late = later(manoeuvre, 1.5 * LASTS), later(manoeuvre, REMEMBERED)
     assert (soon.speed_raised, soon.turn_raised) == (0.0, 0.0)
-    jumpy = ProcessNoise.by_rule(LIMITS, 0.5 * TURN_JUMPY, 0.25 * SPEED_JUMPY)
+    jumpy = ProcessNoise.by_rule(LIMITS, 0.5 * TURN_JUMPY, 0.5 * SPEED_JUMPY)
     assert raised(NOISE, soon, LIMITS).q_v == pytest.approx(jumpy.q_v, rel=0.02)
     assert raised(NOISE, soon, LIMITS).q_u == pytest.approx(jumpy.q_u, rel=0.02)
     assert raised(NOISE, late, LIMITS) == NOISE

@@ -83,7 +83,10 @@ def rules(kind: Kind, front_end: FrontEnd, source: int) -> Rules:
 
 
 def with_noise_given(fixed: Rules) -> Rules:
-    return fixed._replace(noise_learning=fixed.noise_learning._replace(learns=False))
+    return fixed._replace(
+        noise_learning=fixed.noise_learning._replace(learns=False),
+        process_learning=fixed.process_learning._replace(on=False),
+    )
 
 
 class Outcome(NamedTuple):
@@ -305,7 +308,7 @@ FOLDED_IDS = [
 def test_the_order_of_delivery_does_not_matter_to_the_last_bit(
     kind: Kind, front_end: FrontEnd, source: int, frames: bool, odometry: bool
 ) -> None:
-    # What is learned of the noise is learned from what comes in order.
+    # What is learned of noise, of sensors or the leader, is learned from what comes in order.
     fixed, sent = with_noise_given(rules(kind, front_end, source)), smooth_drive(3, 240)
     straight = delivered(fixed, sent)
     other = delivered(fixed, shuffled(sent, 4, frames=frames, odometry=odometry))
