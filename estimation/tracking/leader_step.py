@@ -40,7 +40,7 @@ def followed_leader(
     dt = (measurement.capture_ns - last.measurement.capture_ns) * _NS
     if not notices:
         return Followed(estimator.step(last.belief, dt, way, measurement, gate), last.manoeuvre)
-    manoeuvre = later(last.manoeuvre, dt)
+    manoeuvre = later(last.manoeuvre, dt, last.settled)
     noise = raised(estimator.noise, manoeuvre, estimator.limits)
     prior = estimator.driven_by(noise).predict(last.belief, dt, way)
     if gate > 0.0:

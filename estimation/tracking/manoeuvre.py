@@ -36,6 +36,7 @@ SPEED_JUMPY, TURN_JUMPY = 0.1, 0.5
 """Bandwidths of a leader that turns, stops and goes as it likes, and is found to: what its motion comes to on
 average has no such tails as its jumps have."""
 
+_SET_OFF = 1.0  # [s]
 _SURE = 0.5  # share that one alarm adds to how sure it is that a leader makes jumps
 
 _LEAST_SPEED = 1e-9
@@ -47,6 +48,7 @@ class Manoeuvre(NamedTuple):
     ahead, behind, left, right: likelihood ratios [nat] of a run to that side. running: for how long [s] the
     one along has grown. speed_raised, turn_raised: how long [s] noise is to stay raised. speed_jumps,
     turn_jumps: how sure it is, up to 1, that the leader makes jumps; a single alarm may be chance.
+    settled_for: for how long [s] the track has been settled: who sets off makes no jump yet.
     """
 
     ahead: float
@@ -58,6 +60,7 @@ class Manoeuvre(NamedTuple):
     turn_raised: float
     speed_jumps: float
     turn_jumps: float
+    settled_for: float
 
 
 class Noticed(NamedTuple):
@@ -70,11 +73,11 @@ class Noticed(NamedTuple):
 @kernel
 def steady() -> Manoeuvre:
     """No sign of any manoeuvre."""
-    return Manoeuvre(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Manoeuvre(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
-def later(manoeuvre: Manoeuvre, dt: float) -> Manoeuvre:
+def later(manoeuvre: Manoeuvre, dt: float, settled: bool) -> Manoeuvre:
     """The same after dt [s] without news."""
     kept = 1.0 - min(1.0, dt / REMEMBERED)
     return manoeuvre._replace(
@@ -83,6 +86,7 @@ def later(manoeuvre: Manoeuvre, dt: float) -> Manoeuvre:
         turn_raised=max(0.0, manoeuvre.turn_raised - dt),
         speed_jumps=manoeuvre.speed_jumps * kept,
         turn_jumps=manoeuvre.turn_jumps * kept,
+        settled_for=manoeuvre.settled_for + dt if settled else 0.0,
     )
 
 
@@ -124,7 +128,7 @@ def noticed(
     left, right = _grown(manoeuvre.left, across), _grown(manoeuvre.right, -across)
     running = manoeuvre.running if ahead > 0.0 or behind > 0.0 else 0.0
     after = manoeuvre._replace(ahead=ahead, behind=behind, left=left, right=right, running=running)
-    belief = prior
+    belief, sure = prior, _SURE if manoeuvre.settled_for >= _SET_OFF else 0.0
     if max(ahead, behind) > ALARM:
         if manoeuvre.speed_raised <= 0.0:
             lacking = max(0.0, SPEED_RAISED * limits.k_v * limits.k_v - noise.q_v) * min(running, LASTS)
@@ -133,10 +137,10 @@ def noticed(
                 vx_vy=prior.vx_vy + ex * ey * lacking,
                 vy_vy=prior.vy_vy + ey * ey * lacking,
             )
-        jumps = min(1.0, manoeuvre.speed_jumps + _SURE)
+        jumps = min(1.0, manoeuvre.speed_jumps + sure)
         after = after._replace(ahead=0.0, behind=0.0, running=0.0, speed_raised=LASTS, speed_jumps=jumps)
     if max(left, right) > ALARM:
-        jumps = min(1.0, manoeuvre.turn_jumps + _SURE)
+        jumps = min(1.0, manoeuvre.turn_jumps + sure)
         after = after._replace(left=0.0, right=0.0, turn_raised=LASTS, turn_jumps=jumps)
     return Noticed(after, belief)
 

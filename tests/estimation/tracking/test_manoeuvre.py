@@ -48,9 +48,9 @@ def seen(heading: float, along: float, across: float) -> Measurement:
 
 
 def after(innovations: list[tuple[float, float]], heading: float = 0.3) -> tuple[Manoeuvre, Gaussian]:
-    manoeuvre, belief = steady(), prior(heading)
+    manoeuvre, belief = steady()._replace(settled_for=2.0), prior(heading)
     for along, across in innovations:
-        manoeuvre = later(manoeuvre, FRAME)
+        manoeuvre = later(manoeuvre, FRAME, True)
         manoeuvre, belief = noticed(manoeuvre, prior(heading), seen(heading, along, across), NOISE, LIMITS)
     return manoeuvre, belief
 
@@ -84,9 +84,9 @@ def test_outliers_alone_are_no_manoeuvre() -> None:
 
 def test_noise_hardly_ever_makes_an_alarm() -> None:
     generator, count = np.random.default_rng(5), 0
-    manoeuvre, n = steady(), 20_000
+    manoeuvre, n = steady()._replace(settled_for=2.0), 20_000
     for along, across in generator.standard_normal((n, 2)).tolist():
-        manoeuvre = later(manoeuvre, FRAME)._replace(speed_jumps=0.0, turn_jumps=0.0)
+        manoeuvre = later(manoeuvre, FRAME, True)._replace(speed_jumps=0.0, turn_jumps=0.0)
         manoeuvre, _ = noticed(manoeuvre, prior(0.3), seen(0.3, along, across), NOISE, LIMITS)
         count += (manoeuvre.speed_jumps > 0.0) + (manoeuvre.turn_jumps > 0.0)
     assert 0 < count < n / 500
@@ -94,7 +94,7 @@ def test_noise_hardly_ever_makes_an_alarm() -> None:
 
 def test_what_is_raised_falls_back_and_that_a_leader_jumps_is_forgotten_slowly() -> None:
     manoeuvre, _ = after([(2.0, 2.0)] * 7)
-    soon, late = later(manoeuvre, 1.5 * LASTS), later(manoeuvre, REMEMBERED)
+    soon, late = later(manoeuvre, 1.5 * LASTS, True), later(manoeuvre, REMEMBERED, True)
     assert (soon.speed_raised, soon.turn_raised) == (0.0, 0.0)
     jumpy = ProcessNoise.by_rule(LIMITS, 0.5 * TURN_JUMPY, 0.5 * SPEED_JUMPY)
     assert raised(NOISE, soon, LIMITS).q_v == pytest.approx(jumpy.q_v, rel=0.02)
@@ -104,7 +104,7 @@ def test_what_is_raised_falls_back_and_that_a_leader_jumps_is_forgotten_slowly()
 
 
 def test_a_leader_that_stands_has_no_direction_to_tell_a_run_by() -> None:
-    started = Manoeuvre(7.0, 7.0, 7.0, 7.0, 0.1, 0.0, 0.0, 0.0, 0.0)
+    started = Manoeuvre(7.0, 7.0, 7.0, 7.0, 0.1, 0.0, 0.0, 0.0, 0.0, 2.0)
     for speed in (0.0, 0.4 * LIMITS.v_eps):
         found, belief = noticed(started, prior(0.3, speed), seen(0.3, 3.0, 3.0), NOISE, LIMITS)
         assert (found.ahead, found.behind, found.left, found.right) == (0.0, 0.0, 0.0, 0.0)
