@@ -267,25 +267,28 @@ def _learned(known: Known, memory: Memory, rules: Rules, verdict: int) -> Learne
 
 
 @kernel
+def _with_checked(known: Known, memory: Memory, rules: Rules, told: OdometrySample) -> Known:
+    """Known with a sample of odometry in its check, and in what is found of its noise."""
+    check, by = known.odometry_check, known.correction
+    told = told._replace(v2=by.scale_v * told.v2, u2=by.scale_u * told.u2)
+    known = known._replace(odometry_check=with_sample(check, memory.ways, told, rules.own_noise))
+    if known.own.length == 0:
+        return known
+    learns = rules.noise_learning.learns
+    seen = with_noise(rules, scaled_noise(rules.noise, known.noise)) if learns else rules
+    known = known._replace(odometry_check=judged_odometry(known, memory, seen))
+    return with_odometry_noise(known, check, told, seen) if learns and rules.filter.in_world else known
+
+
+@kernel
 def take_odometry(known: Known, memory: Memory, rules: Rules, told: OdometrySample) -> Known:
     """Take in a sample of odometry, and fold again what came after the sample before it."""
     sample = MotionSample(told.stamp_ns, told.v2, told.u2)
     if rules.source == AUTO:
-        before = known.odometry_check
-        check = before
+        check = known.odometry_check
         if source_of(check) == POSE and told.has_pose and check.last.has_pose:
             sample = by_pose(check.last, told)
-        by = known.correction
-        told = told._replace(v2=by.scale_v * told.v2, u2=by.scale_u * told.u2)
-        check = with_sample(check, memory.ways, told, rules.own_noise)
-        known = known._replace(odometry_check=check)
-        if known.own.length > 0:
-            seen, learns = rules, rules.noise_learning.learns
-            if learns:
-                seen = with_noise(rules, scaled_noise(rules.noise, known.noise))
-            known = known._replace(odometry_check=judged_odometry(known, memory, seen))
-            if learns and rules.filter.in_world:
-                known = with_odometry_noise(known, before, told, seen)
+        known = _with_checked(known, memory, rules, told)
     ring = remember(memory.history, known.odometry, sample, rules.span)
     known = known._replace(odometry=ring)
     n = known.track.length

@@ -28,7 +28,7 @@ def drive(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Times, poses of a body at MOUNT and true speeds; the heading's noise is 12 rad/m of it."""
     random = np.random.default_rng(seed)
-    t: FloatArray = np.arange(round(seconds / STEP)) * STEP
+    t = np.arange(round(seconds / STEP), dtype=np.float64) * STEP
     u = mean_turn + turn * np.sin(omega * t + seed)
     v: FloatArray = 0.08 + faster_by_turn * u
     theta = np.cumsum(u) * STEP + random.uniform(-3.0, 3.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from hil.nodes.findings import (
     ADVICE,
+    Findings,
     advice_on,
     all_found,
     finding_line,
@@ -24,7 +25,12 @@ def test_findings_come_out_of_diagnostics_as_they_went_in() -> None:
 
 def test_all_that_was_ever_found_is_kept_in_its_last_words() -> None:
     later = {"odometry_silent": "no odometry for 9 s, expected 30 a second"}
-    reports = [{"a": SILENT, "b": {}}, {"a": {}}, {"a": later, "b": {"clock": "behind"}}, {"a": {}}]
+    reports: list[dict[str, Findings]] = [
+        {"a": SILENT, "b": {}},
+        {"a": {}},
+        {"a": later, "b": {"clock": "behind"}},
+        {"a": {}},
+    ]
     assert all_found(reports) == {"a": later, "b": {"clock": "behind"}}
 
 
