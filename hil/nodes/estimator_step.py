@@ -78,9 +78,10 @@ from hil.nodes.own_motion_step import (
     by_odometry,
     by_pose,
     due_pose,
+    finds_odometry_noise,
     is_fresh,
-    judged_odometry,
     own_again,
+    with_judged_odometry,
     with_odometry_noise,
 )
 
@@ -187,7 +188,7 @@ def _take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, see
         reprocessed(memory.points, after.track, first, rules.settings, rules.filter)
     if rules.source == AUTO:
         since_ns = after.watched_ns if after.watched_ns > 0 else capture_ns
-        after = after._replace(odometry_check=judged_odometry(after, memory, rules), watched_ns=since_ns)
+        after = with_judged_odometry(after, memory, rules)._replace(watched_ns=since_ns)
     return taken._replace(known=after)
 
 
@@ -271,13 +272,14 @@ def _with_checked(known: Known, memory: Memory, rules: Rules, told: OdometrySamp
     """Known with a sample of odometry in its check, and in what is found of its noise."""
     check, by = known.odometry_check, known.correction
     told = told._replace(v2=by.scale_v * told.v2, u2=by.scale_u * told.u2)
+    if check.heard and finds_odometry_noise(rules):
+        known = with_odometry_noise(known, check.last, told, rules)
     known = known._replace(odometry_check=with_sample(check, memory.ways, told, rules.own_noise))
     if known.own.length == 0:
         return known
     learns = rules.noise_learning.learns
     seen = with_noise(rules, scaled_noise(rules.noise, known.noise)) if learns else rules
-    known = known._replace(odometry_check=judged_odometry(known, memory, seen))
-    return with_odometry_noise(known, check, told, seen) if learns and rules.filter.in_world else known
+    return with_judged_odometry(known, memory, seen)
 
 
 @kernel

@@ -7,7 +7,6 @@ from estimation.models.measurement import PairSeen
 from estimation.own_motion.judged_odometry import age_of, aged, fresh_for, is_better, with_own_track
 from estimation.own_motion.odometry_check import (
     TRACK,
-    OdometryCheck,
     OdometrySample,
     awaits_track,
     source_of,
@@ -108,22 +107,31 @@ def by_either_at(known: Known, memory: Memory, rules: Rules, capture_ns: int) ->
 
 
 @kernel
-def judged_odometry(known: Known, memory: Memory, rules: Rules) -> OdometryCheck:
-    """Odometry's check with what the follower's own track has to say."""
-    check = known.odometry_check
-    if not awaits_track(check):
-        return check
-    return with_own_track(check, memory.ways, memory.own, known.own, rules.own_noise, _trust(known, rules))
+def with_judged_odometry(known: Known, memory: Memory, rules: Rules) -> Known:
+    """Known with what the follower's own track has to say of odometry, and of how far it is off."""
+    before = known.odometry_check
+    if not awaits_track(before):
+        return known
+    after = with_own_track(before, memory.ways, memory.own, known.own, rules.own_noise, _trust(known, rules))
+    known = known._replace(odometry_check=after)
+    if not finds_odometry_noise(rules) or not before.windowed or not after.windowed:
+        return known
+    if after.since.stamp_ns <= before.since.stamp_ns:
+        return known
+    noise = noise_with_window(known.odometry_noise, before.since, after.since, rules.trust, rules.own_noise)
+    return known._replace(odometry_noise=noise)
 
 
 @kernel
-def with_odometry_noise(known: Known, before: OdometryCheck, told: OdometrySample, rules: Rules) -> Known:
-    """Known with what a sample tells of odometry's noise, and a window that has ended by it."""
-    noise, after = known.odometry_noise, known.odometry_check
-    if before.heard:
-        noise = noise_with_sample(noise, before.last, told, rules.trust, rules.own_noise)
-    if before.windowed and after.windowed and after.since.stamp_ns > before.since.stamp_ns:
-        noise = noise_with_window(noise, before.since, after.since, rules.trust, rules.own_noise)
+def finds_odometry_noise(rules: Rules) -> bool:
+    """Whether the noise of odometry is found; along the follower's axes slip and lag are told for it."""
+    return rules.noise_learning.learns and rules.filter.in_world
+
+
+@kernel
+def with_odometry_noise(known: Known, last: OdometrySample, told: OdometrySample, rules: Rules) -> Known:
+    """Known with what a sample that follows on another tells of odometry's noise."""
+    noise = noise_with_sample(known.odometry_noise, last, told, rules.trust, rules.own_noise)
     return known._replace(odometry_noise=noise)
 
 
