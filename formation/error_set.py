@@ -43,7 +43,7 @@ _SPARE = (6e-4, 1.5e-3, 5e-3)
 Curve = tuple[FloatArray, FloatArray]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ErrorSet:
     """A proved set; ``inward``: least speed of the field across it, in rho / rho_0 and alpha1 a second."""
 

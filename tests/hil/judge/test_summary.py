@@ -98,7 +98,8 @@ def test_a_short_run_is_as_good_as_it_should_be(judged: dict[str, Any]) -> None:
     assert 1.5 < estimation["nis_mean"] < 2.3
     assert 0.0005 < estimation["rmse"]["v1"] < 0.004
     assert 0.005 < estimation["rmse"]["alpha1"] < math.radians(3.0)
-    assert all(0.3 < share < 1.3 for share in estimation["efficiency"].values())
+    # The leader drives evenly, which is found out: its speed is known far better than a random leader's.
+    assert all(0.1 < share < 1.3 for share in estimation["efficiency"].values())
     assert all(share > 0.98 for share in estimation["coverage_3sigma"].values())
     assert bounds["checked"] == estimation["samples"]
     assert [bounds["violations"][name] for name in BOUNDS if name.endswith("_extended")] == [0, 0, 0]
