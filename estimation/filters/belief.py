@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from estimation.filters.filter_states import Guess, Horizon, SensorOffsets, ShapeState
 from estimation.filters.gaussian import Gaussian, nis_of, started
+from estimation.filters.leader_prior import standing_noise, within_limits
 from estimation.filters.lever_arm import NO_LEVER, Lever
 from estimation.models import motion
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
@@ -96,3 +97,17 @@ class Model:
         if self.front_end is FrontEnd.WORLD:
             return motion.process_noise(mean, dt, self.noise)
         return motion.process_noise_body(mean, dt, self.noise, follower, self.input_correlation)
+
+    def behind(self, belief: Belief) -> Model:
+        """The model of what comes after a belief: along the follower's axes, only a leader that is known to
+        be slower than v_eps sets off."""
+        if self.front_end is FrontEnd.WORLD:
+            return self
+        return replace(self, noise=standing_noise(belief.gaussian, self.noise))
+
+    def within_limits(self, belief: Belief, dt: float) -> Belief:
+        """Belief to which, along the follower's axes, the leader's limits are told for dt [s]."""
+        if self.front_end is FrontEnd.WORLD:
+            return belief
+        told = within_limits(belief.gaussian, dt, self.noise, self.limits)
+        return belief._replace(mean=told.mean, covariance=told.covariance)

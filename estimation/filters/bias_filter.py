@@ -68,14 +68,18 @@ class BiasedExtended(Estimator):
         """Belief after dt [s], the follower having moved as given; the offsets stay."""
         offsets, model = offsets_of(belief), self.model
         move = model.transition(belief.mean, dt, follower)
-        covariance = move @ belief.covariance @ move.T + model.process_noise(belief.mean, dt, follower)
+        drive = model.behind(belief).process_noise(belief.mean, dt, follower)
+        covariance = move @ belief.covariance @ move.T + drive
+        ahead = Belief(model.propagate(belief.mean, dt, follower), 0.5 * (covariance + covariance.T))
+        told = model.within_limits(ahead, dt)
+        # The limits are told to the leader's states alone, so the rest that they leave is that of P' = rest P.
+        rest = np.linalg.solve(ahead.covariance, told.covariance).T
         moved = replace(
             offsets,
-            cross=move @ offsets.cross,
+            cross=rest @ move @ offsets.cross,
             excitation=_aged(offsets.excitation, math.exp(-dt / _MEMORY)),
         )
-        mean = model.propagate(belief.mean, dt, follower)
-        return Belief(mean, 0.5 * (covariance + covariance.T), filter_state=moved)
+        return told._replace(filter_state=moved)
 
     def update(self, belief: Belief, measurement: Measurement) -> Belief:
         """Belief after a measurement (Joseph form); offsets that cannot be told get no gain."""

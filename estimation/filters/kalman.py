@@ -40,9 +40,9 @@ class ExtendedFilter(Estimator):
         carrier.x, carrier.P = belief.mean, belief.covariance
         carrier.moved = self.model.propagate(belief.mean, dt, follower)
         carrier.F = self.model.transition(belief.mean, dt, follower)
-        carrier.Q = self.model.process_noise(belief.mean, dt, follower)
+        carrier.Q = self.model.behind(belief).process_noise(belief.mean, dt, follower)
         carrier.predict()
-        return Belief(carrier.x, _symmetric(carrier.P))
+        return self.model.within_limits(Belief(carrier.x, _symmetric(carrier.P)), dt)
 
     def update(self, belief: Belief, measurement: Measurement) -> Belief:
         """Belief after a measurement of the leader's position (Joseph form)."""
@@ -74,9 +74,9 @@ class UnscentedFilter(Estimator):
         """Belief after dt [s], the follower having moved as given."""
         carrier = self._carrier
         carrier.x, carrier.P = belief.mean, belief.covariance
-        carrier.Q = self.model.process_noise(belief.mean, dt, follower)
+        carrier.Q = self.model.behind(belief).process_noise(belief.mean, dt, follower)
         carrier.predict(dt=dt, follower=follower)
-        return Belief(carrier.x, _symmetric(carrier.P))
+        return self.model.within_limits(Belief(carrier.x, _symmetric(carrier.P)), dt)
 
     def update(self, belief: Belief, measurement: Measurement) -> Belief:
         """Belief after a measurement of the leader's position."""

@@ -49,12 +49,13 @@ class MovingHorizon(Estimator):
         model = self.model
         mean = model.propagate(belief.mean, dt, follower)
         move = model.transition(belief.mean, dt, follower)
-        drive = model.process_noise(belief.mean, dt, follower)
+        drive = model.behind(belief).process_noise(belief.mean, dt, follower)
         covariance = move @ belief.covariance @ move.T + drive
-        stage = Stage(dt, follower, drive, mean)
+        told = model.within_limits(Belief(mean, 0.5 * (covariance + covariance.T)), dt)
+        stage = Stage(dt, follower, drive, told.mean)
         horizon = _horizon_of(belief)
         grown = replace(horizon, stages=(*horizon.stages, stage))
-        return Belief(mean, 0.5 * (covariance + covariance.T), filter_state=grown)
+        return told._replace(filter_state=grown)
 
     def update(self, belief: Belief, measurement: Measurement) -> Belief:
         """Belief after a measurement: the last state of the window fitted anew."""
@@ -76,7 +77,7 @@ class MovingHorizon(Estimator):
         known, predicted, spreads, shared = [mean], [], [], []
         for before, stage in pairwise(horizon.stages):
             ahead, spread, cross = self._moved(before, stage, mean, covariance)
-            mean, covariance = _seen(stage, ahead, spread)
+            mean, covariance = _seen(stage, *self._told(stage, ahead, spread))
             known.append(mean)
             predicted.append(ahead)
             spreads.append(spread)
@@ -93,7 +94,16 @@ class MovingHorizon(Estimator):
         oldest, second = horizon.stages[0:2]
         mean, covariance = _seen(oldest, horizon.mean, horizon.covariance)
         mean, covariance, _ = self._moved(oldest, second, mean, covariance)
-        return Horizon(mean, 0.5 * (covariance + covariance.T), horizon.stages[1:])
+        mean, covariance = self._told(second, mean, 0.5 * (covariance + covariance.T))
+        return Horizon(mean, covariance, horizon.stages[1:])
+
+    def _told(self, stage: Stage, mean: Vector, covariance: Matrix) -> tuple[Vector, Matrix]:
+        """Mean and covariance at a stage with what the leader's limits say of the time since the last one.
+
+        It is told like a measurement, by where the pass is: for the smoother it comes after the motion.
+        """
+        told = self.model.within_limits(Belief(mean, covariance), stage.dt)
+        return told.mean, told.covariance
 
     def _moved(
         self, before: Stage, stage: Stage, mean: Vector, covariance: Matrix

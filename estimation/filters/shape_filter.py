@@ -58,7 +58,7 @@ class ShapeFilter(Estimator):
         move = model.transition(belief.mean, dt, follower)
         covariance = move @ belief.covariance @ move.T + model.process_noise(belief.mean, dt, follower)
         mean = model.propagate(belief.mean, dt, follower)
-        aged = _aged(_guess_of(belief), dt, follower, model.front_end)
+        aged = _aged(_guess_of(belief), dt, follower, model)
         return Belief(mean, 0.5 * (covariance + covariance.T), filter_state=aged)
 
     def update(self, belief: Belief, measurement: Measurement) -> Belief:
@@ -100,19 +100,22 @@ def _guess_of(belief: Belief) -> Guess:
     return belief.filter_state
 
 
-def _aged(guess: Guess, dt: float, follower: FollowerMotion, front_end: FrontEnd) -> Guess:
-    """Guess after dt [s]: in the body frame the anchor moves as the follower turns and drives away."""
-    if front_end is FrontEnd.WORLD:
+def _aged(guess: Guess, dt: float, follower: FollowerMotion, model: Model) -> Guess:
+    """Guess after dt [s]: in the body frame the anchor moves as the follower turns and drives away.
+
+    The follower's own errors last for the model's correlation time, so that they add up as squares.
+    """
+    if model.front_end is FrontEnd.WORLD:
         return replace(guess, elapsed=guess.elapsed + dt)
     standing = np.array([*guess.anchor.tolist(), 0.0, 0.0, 0.0])
     turn = motion.transition_body(standing, dt, follower)[0:2, 0:2]
-    reach = math.hypot(*guess.anchor.tolist())
+    reach, strayed = math.hypot(*guess.anchor.tolist()), math.sqrt(2.0 * model.input_correlation * dt)
     return replace(
         guess,
         anchor=motion.propagate_body(standing, dt, follower)[0:2],
         covariance=turn @ guess.covariance @ turn.T,
         elapsed=guess.elapsed + dt,
-        drift=guess.drift + dt * math.hypot(follower.sd_v2, reach * follower.sd_u2),
+        drift=math.hypot(guess.drift, strayed * math.hypot(follower.sd_v2, reach * follower.sd_u2)),
     )
 
 

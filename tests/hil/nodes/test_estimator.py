@@ -317,7 +317,8 @@ def rough_inputs(tmp_path_factory: pytest.TempPathFactory) -> list[Timed]:
 def test_over_a_whole_log_the_compiled_filter_is_filterpys(
     rough_inputs: list[Timed], kind: str, front_end: str
 ) -> None:
-    given = [f"estimator.front_end={front_end}"]
+    # filterpy's filters keep the process noise that they are told.
+    given = [f"estimator.front_end={front_end}", "estimator.process_noise=given"]
     nodes = [
         EstimatorNode(load_scenario("turtlebot3", [f"estimator.kind={kind}{suffix}", *given]))
         for suffix in ("", "-filterpy")
