@@ -231,7 +231,7 @@ class EstimatorNode:
         stops = self.rules.step.mounts.stops
         problem = problem or mount_problem(known.mount_check, stops=stops)
         values: dict[str, object] = {"status": state.memory.status(now_ns).name.lower()}
-        if stops and values["status"] == "tracking" and is_off(known.mount_check):
+        if stops and values["status"] in ("tracking", "initialising") and is_off(known.mount_check):
             values["status"] = "rejecting"
         values |= mount_report(known.mount_check)
         values |= clock_report(state.times, state.memory.desk.time)

@@ -44,6 +44,7 @@ from estimation.tracking.mount_check import is_off
 from estimation.tracking.mount_check import watched as mount_watched
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE, RESTARTED, USED, TrackPoint
 from estimation.tracking.tracker import (
+    INITIALISING,
     REJECTING,
     TRACKING,
     add,
@@ -376,6 +377,8 @@ def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) 
     point = newest(points, known.track)
     point = point._replace(belief=rules.filter.leader(point.belief, point.measurement))
     status, cause = status_of(point, now_ns, rules.settings), point.cause
-    if status == TRACKING and rules.mounts.stops and is_off(known.mount_check):
+    # A leader that stands need not be waited for while the follower must not be driven anyway.
+    waits = status in (TRACKING, INITIALISING)
+    if waits and rules.mounts.stops and is_off(known.mount_check):
         status, cause = REJECTING, MOUNT
     return Told(guessed_when_slow(estimate_at(point, status), rules.filter.limits.v_eps), cause)

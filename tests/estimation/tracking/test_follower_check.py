@@ -124,7 +124,7 @@ def test_of_good_poses_no_more_are_rejected_than_the_gate_says() -> None:
 
 def test_the_causes_are_counted_by_words() -> None:
     assert [cause.word for cause in Cause] == [
-        "", "gated", "follower_outlier", "flipped_heading", "swapped", "frozen"
+        "", "gated", "follower_outlier", "flipped_heading", "swapped", "frozen", "wrong_mount"
     ]  # fmt: skip
 
 

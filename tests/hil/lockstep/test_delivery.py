@@ -1,4 +1,4 @@
-"""What the order of delivery does to the estimates: nothing."""
+"""What the order of delivery does to the estimates by noise that is given: nothing."""
 
 from __future__ import annotations
 

@@ -289,7 +289,7 @@ def test_while_measurements_are_missing_it_says_so_by_itself() -> None:
 def test_diagnostics_name_what_is_missing_and_what_was_counted() -> None:
     begun = NODE.begin(EPOCH_NS)
     before = decode_as(NODE.report(begun, EPOCH_NS).payload, msg.DiagnosticArray).status[0]
-    assert (before.level, before.message) == (1, "waiting for mocap and odometry")
+    assert (before.level, before.message) == (1, "waiting for mocap")
     state, _ = fed([(WARM_NS, Event(topics.RIGID_BODIES, b"?"))], NODE, WARM)
     after = decode_as(NODE.report(state, WARM_NS).payload, msg.DiagnosticArray).status[0]
     values = {value.key: value.value for value in after.values}
