@@ -99,8 +99,10 @@ class Model:
         return motion.process_noise_body(mean, dt, self.noise, follower, self.input_correlation)
 
     def behind(self, belief: Belief) -> Model:
-        """The model of what comes after a belief: along the follower's axes, only a leader that is known to
-        be slower than v_eps sets off."""
+        """The model of what comes after a belief.
+
+        Along the follower's axes, only a leader that is known to be slower than v_eps sets off.
+        """
         if self.front_end is FrontEnd.WORLD:
             return self
         return replace(self, noise=standing_noise(belief.gaussian, self.noise))

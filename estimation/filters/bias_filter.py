@@ -72,7 +72,7 @@ class BiasedExtended(Estimator):
         covariance = move @ belief.covariance @ move.T + drive
         ahead = Belief(model.propagate(belief.mean, dt, follower), 0.5 * (covariance + covariance.T))
         told = model.within_limits(ahead, dt)
-        # The limits are told to the leader's states alone, so the rest that they leave is that of P' = rest P.
+        # The limits are told to the leader's states alone, so what they leave of it is that of P' = rest P.
         rest = np.linalg.solve(ahead.covariance, told.covariance).T
         moved = replace(
             offsets,
