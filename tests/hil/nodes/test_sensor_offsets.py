@@ -13,7 +13,8 @@ from hil.wire.messages import decode_as, encode, header
 
 START_NS = 1_000_000_000
 STEP_NS = 50_000_000
-BODY = ["estimator.front_end=body", "estimator.turn_bandwidth=0.01", "estimator.sigma_u2=0.005"]
+NO_SLIP = ["estimator.slip_v2=0", "estimator.slip_u2=0"]  # slip might be what an offset does
+BODY = ["estimator.front_end=body", "estimator.turn_bandwidth=0.01", "estimator.sigma_u2=0.005", *NO_SLIP]
 OFFSETS = (0.03, -0.08)
 
 

@@ -46,6 +46,8 @@ sigma_range = 0.001
 sigma_bearing = 0.003
 sigma_v2 = 0.001
 sigma_u2 = 0.005
+slip_v2 = 0.0
+slip_u2 = 0.0
 """
 POSE_MAP = """
 [columns]
