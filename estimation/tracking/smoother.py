@@ -6,11 +6,12 @@ For reference tracks out of a log; of no use to a follower that has to act now.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from estimation.filters.gaussian import Gaussian
+from estimation.models.coordinated_turn import ProcessNoise
 from estimation.models.measurement import Measurement
 from estimation.models.motion import STATE_SIZE
 from estimation.tracking.follower_check import BELIEVED
@@ -21,19 +22,25 @@ from estimation.tracking.track_point import TrackPoint, Verdict, no_tentative, w
 _NS = 1e-9
 
 
-def smooth(tracker: Tracker, measurements: Iterable[Measurement]) -> tuple[TrackPoint, ...]:
+def smooth(
+    tracker: Tracker, measurements: Iterable[Measurement], noises: Mapping[int, ProcessNoise] | None = None
+) -> tuple[TrackPoint, ...]:
     """Fold a whole track, in any order and with duplicates, and smooth it.
 
     ``tracker`` folds with a filter on the coordinated turn, as ``ekf`` is: its beliefs are those of the
     model. Points come in the order of capture times; verdict, NIS and time of the newest measurement used are
     those of the forward pass, the belief is the smoothed one, and whether the track is settled follows from
-    it. A restart parts the track: nothing is carried back over it.
+    it. A restart parts the track: nothing is carried back over it. ``noises``: process noise up to a capture
+    time, where it is not always the filter's own.
     """
-    forward = _forward(tracker, measurements)
+    driven = noises or {}
+    forward = _forward(tracker, measurements, driven)
     backward: list[TrackPoint] = []
     for point in reversed(forward):
         if backward and backward[-1].verdict != Verdict.RESTARTED:
-            point = point._replace(belief=_carried_back(tracker, point, backward[-1]))
+            point = point._replace(
+                belief=_carried_back(_driven(tracker, backward[-1].measurement, driven), point, backward[-1])
+            )
         backward.append(point)
     smoothed: list[TrackPoint] = []
     for point in reversed(backward):
@@ -43,12 +50,21 @@ def smooth(tracker: Tracker, measurements: Iterable[Measurement]) -> tuple[Track
     return tuple(smoothed)
 
 
-def _forward(tracker: Tracker, measurements: Iterable[Measurement]) -> list[TrackPoint]:
+def _driven(tracker: Tracker, due: Measurement, noises: Mapping[int, ProcessNoise]) -> Tracker:
+    """Tracker whose filter takes the leader to have been driven so up to a measurement."""
+    noise = noises.get(due.capture_ns)
+    return tracker if noise is None else Tracker(tracker.estimator.driven_by(noise), tracker.settings)
+
+
+def _forward(
+    tracker: Tracker, measurements: Iterable[Measurement], noises: Mapping[int, ProcessNoise]
+) -> list[TrackPoint]:
     by_capture = {each.capture_ns: each for each in measurements}
     points: list[TrackPoint] = []
     for capture_ns in sorted(by_capture):
         due = by_capture[capture_ns]
-        points.append(tracker.follow(points[-1], due) if points else tracker.begin(due))
+        of = _driven(tracker, due, noises)
+        points.append(of.follow(points[-1], due) if points else of.begin(due))
     return points
 
 

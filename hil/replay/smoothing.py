@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from msgspec.structs import replace
 
 from estimation.bounds.certified import Certain, Failed
+from estimation.models.coordinated_turn import ProcessNoise
 from estimation.models.measurement import Measurement
 from estimation.tracking.estimate import estimate_of, guessed_when_slow
 from estimation.tracking.follower_check import Cause
@@ -29,7 +30,8 @@ from hil.wire.writing import EstimateWriter
 class ListeningEstimator(EstimatorNode):
     """The EKF's node, which keeps the measurements of its whole life, by capture time, beside its state.
 
-    Where estimates are certified it keeps what was certain at each, too.
+    Of each it keeps the process noise that it was folded with, too, which may have been learned by then.
+    Where estimates are certified it keeps what was certain at each as well.
     """
 
     def __init__(self, scenario: Scenario, name: str = NAME, others: frozenset[str] = frozenset()) -> None:
@@ -38,6 +40,7 @@ class ListeningEstimator(EstimatorNode):
         ekf = replace(scenario, estimator=replace(scenario.estimator, kind="ekf"))
         super().__init__(ekf, name, others)
         self.measurements: dict[int, Measurement] = {}
+        self.noises: dict[int, ProcessNoise] = {}
         self.certain: dict[int, Certain | Failed] = {}
 
     def step(
@@ -47,6 +50,7 @@ class ListeningEstimator(EstimatorNode):
         after, sent = super().step(state, event, now_ns)
         if event.topic and (track := after.memory.track):
             self.measurements |= {point.measurement.capture_ns: point.measurement for point in track}
+            self.noises |= {point.measurement.capture_ns: point.noise for point in track}
             if self.certifying is not None:
                 newest_ns = track[-1].measurement.capture_ns
                 known = self.certifying.certain(after.believed, after.memory.history, newest_ns)
@@ -70,7 +74,7 @@ def smoothed_estimates(node: ListeningEstimator) -> Smoothed:
     estimates, certified = [], []
     writer = EstimateWriter(node.topics.follower, node.rules.assumed, ALL_REASONS)
     tracker = Tracker(node.rules.step.filter, node.rules.step.settings)
-    for point in smooth(tracker, node.measurements.values()):
+    for point in smooth(tracker, node.measurements.values(), node.noises):
         measurement = point.measurement
         capture_ns, frame_id = measurement.capture_ns, node.topics.follower
         status = tracker.status((point,), capture_ns)

@@ -247,7 +247,10 @@ def test_a_turn_rate_that_nobody_can_know_is_not_fed_forward() -> None:
     # The matrix is the unit matrix: a standard deviation of 1 rad/s, of a leader that turns at 0.7 at most.
     _, doubtful, _ = fed([(NOW_NS, estimate())], node)
     assert doubtful[0].v2_wanted == plain[0].v2_wanted
-    sure = estimate(covariance=1e-6 * np.eye(5).reshape(25))
+    # As a filter at 2 rad/s reports it: the covariance with alpha1 is minus the variance over that.
+    steady = 1e-2 * np.eye(5)
+    steady[3, 4] = steady[4, 3] = -5e-3
+    sure = estimate(covariance=steady.reshape(25))
     _, commands, _ = fed([(NOW_NS, sure)], node)
     assert commands[0].v2_wanted > plain[0].v2_wanted + 0.05
     torn = estimate(covariance=np.full(25, math.nan))
