@@ -53,7 +53,7 @@ def test_a_notebook_runs_and_draws(path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 def test_the_table_of_poses_is_what_the_emulator_gives(tmp_path: Path) -> None:
     """Where the follower drives hangs on its estimates, so what these are made of is told."""
-    changed = {"run.duration_s": 12.0, "mocap.rate_hz": 60.0, "mocap.loss": 0.05}
+    changed: dict[str, str | float] = {"run.duration_s": 12.0, "mocap.rate_hz": 60.0, "mocap.loss": 0.05}
     changed |= {f"estimator.{name}": "given" for name in ("noise", "process_noise")}
     changed |= {"estimator.own_motion": "odometry"}
     abreast.run_lockstep(abreast.load_scenario("turtlebot3", changed), log=tmp_path / "run.mcap")
