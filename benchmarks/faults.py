@@ -33,6 +33,7 @@ from controllers.laws import independent
 from controllers.limits import Limits
 from estimation.bounds.window_velocity import window_velocity
 from estimation.models.measurement import FrontEnd, PairSeen
+from estimation.own_motion.odometry_check import OdometrySample
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.tracking.estimate import Estimate
 from estimation.tracking.track_point import GATED, NO_JUMP
@@ -168,7 +169,7 @@ def inject(
     for k, moment in enumerate(drive(node.scenario, generator, math.ceil(until / PERIOD))):
         t, capture_ns = k * PERIOD, (k + 120) * PERIOD_NS
         for sample in moment.heard:
-            store(memory.desk.sample, 0, sample)
+            store(memory.desk.sample, 0, OdometrySample(*sample, False, Pose(0.0, 0.0, 0.0)))
             memory.take_odometry()
         faults = fault_rows([] if fault is None else [fault])
         frame = faulty(faults, t, PERIOD, moment.shown, last or moment.shown)

@@ -69,6 +69,7 @@ def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
         "clock": {"offset_ms", "jitter_ms", "jumps"},
         "commands": {"sent", "saturated", "stopped"},
         "log": {"path", "messages", "bytes"},
+        "noise": {"scale"},
     }
     assert set(judged) - set(parts) - {"rejected"} == {
         "scenario",
