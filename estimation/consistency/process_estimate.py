@@ -185,10 +185,14 @@ def _waiting(
     for k in range(MEMBERS):
         # Scores of zero where there are none yet: rows begin with that.
         store(bank, k, load(Member, bank, k)._replace(belief=belief))
+    return _emptied(learned._replace(begun=True, at_ns=now_ns), measurement)
+
+
+@kernel
+def _emptied(learned: LearnedProcess, measurement: Measurement) -> LearnedProcess:
+    """The same with nothing put together since a measurement."""
     return learned._replace(
-        begun=True,
-        at_ns=now_ns,
-        ended_ns=now_ns,
+        ended_ns=measurement.capture_ns,
         motion=measurement.motion,
         together=0,
         later_ns=0,
@@ -226,19 +230,7 @@ def _scored(
         tried = tried * SPEED_RATIO
     speed = _taken(bank, rules.told.q_v / rules.speed, learned.speed, dt, False)
     turn = _taken(bank, rules.told.q_u / rules.turn, learned.turn, dt, True)
-    return learned._replace(
-        speed=speed,
-        turn=turn,
-        at_ns=due_ns,
-        ended_ns=measurement.capture_ns,
-        motion=measurement.motion,
-        together=0,
-        later_ns=0,
-        x=0.0,
-        y=0.0,
-        way_s=0.0,
-        way=FollowerMotion(0.0, 0.0, 0.0, 0.0),
-    )
+    return _emptied(learned._replace(speed=speed, turn=turn, at_ns=due_ns), measurement)
 
 
 @kernel(inline=False)

@@ -98,6 +98,12 @@ class Sums(NamedTuple):
     misfit: float
 
 
+@kernel
+def no_sums() -> Sums:
+    """Sums of nothing."""
+    return Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
 class OdometryCheck(NamedTuple):
     """All that is known of how odometry does; ``heard``: whether there was a sample.
 
@@ -138,7 +144,6 @@ class OdometryCheck(NamedTuple):
 _NO_WAY = Ways(0.0, 0.0)
 _NO_ENTRY = WayEntry(0, _NO_WAY, _NO_WAY, _NO_WAY)
 _BELIEVED = SourceCheck(0.0, 0, 2, True)
-NO_SUMS = Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _NO_SAMPLE = OdometrySample(0, 0.0, 0.0, False, Pose(0.0, 0.0, 0.0))
 UNCHECKED = OdometryCheck(
     heard=False,
@@ -154,8 +159,8 @@ UNCHECKED = OdometryCheck(
     since=_NO_ENTRY,
     by_twist=_BELIEVED,
     by_pose=_BELIEVED,
-    v=NO_SUMS,
-    u=NO_SUMS,
+    v=no_sums(),
+    u=no_sums(),
     late=0.0,
     doubt=0.0,
     bad_ns=0,
@@ -378,12 +383,6 @@ def _with_window(source: SourceCheck, misfit: float, tells: bool) -> SourceCheck
     if trusted and not source.trusted:
         excess = 0.0
     return SourceCheck(excess, borne_out, source.needs, trusted)
-
-
-@kernel
-def no_sums() -> Sums:
-    """Sums of nothing."""
-    return Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel

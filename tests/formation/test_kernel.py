@@ -288,3 +288,17 @@ def test_kernels_keep_to_what_gives_the_same_bits_everywhere(path: Path) -> None
                 and node.value.id == "math"
             ):
                 assert node.attr not in ("hypot", "dist", "pow", "remainder"), f"{function.name}: {node.attr}"
+
+
+def test_no_two_records_have_a_kernel_of_one_name() -> None:
+    """Compiled code finds a record's kernel by its name alone, and would take the other record's."""
+    owners: dict[str, list[str]] = {}
+    for path in KERNEL_FILES:
+        marked = {node.lineno for node in kernels_in(path)}
+        for record in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(record, ast.ClassDef):
+                for node in record.body:
+                    if isinstance(node, ast.FunctionDef) and node.lineno in marked:
+                        owners.setdefault(node.name, []).append(record.name)
+    assert len(owners) > 20
+    assert not {name: records for name, records in owners.items() if len(records) > 1}

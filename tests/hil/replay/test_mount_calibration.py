@@ -9,7 +9,6 @@ import pytest
 
 from estimation.calibration.mounts import NOTHING_FOUND
 from formation.mount import Mount
-from hil.command_line import main
 from hil.judge.replayed import ReplayChoice, replayed
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import read_log
@@ -21,6 +20,7 @@ from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.messages import decode_as, encode
+from tests.hil.replay.calibrate_command import calibrated
 
 LEADER, FOLLOWER = Mount(0.05, -0.02, -0.2), Mount(0.02, 0.03, 0.15)
 
@@ -54,14 +54,6 @@ def rewritten(run_log: Path, path: Path, *, of_ours: bool = True, spin: float = 
                 payload = encode(frame)
             out.write(record.topic, record.typename, payload, record.log_ns, record.publish_ns)
     return path
-
-
-def calibrated(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as done:
-        main(["calibrate", *map(str, words)])
-    said = capsys.readouterr()
-    assert isinstance(done.value.code, int)
-    return done.value.code, said.out, said.err
 
 
 def test_both_mounts_are_told_in_full_with_the_lines_that_say_so(

@@ -7,7 +7,6 @@ import pytest
 
 from estimation.calibration.actuator_response import ActuatorResponse
 from estimation.own_motion.input_alignment import Known
-from hil.command_line import main
 from hil.lockstep.run import run_lockstep
 from hil.log.metadata import log_metadata
 from hil.log.reader import read_log
@@ -16,6 +15,7 @@ from hil.replay.rerun import replay
 from hil.replay.timing import Timing, timing_of
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
+from tests.hil.replay.calibrate_command import calibrated
 
 WRONG = load_scenario(
     "turtlebot3",
@@ -41,14 +41,6 @@ def without(run_log: Path, path: Path, *left_out: str) -> Path:
         for record in log.records([topic for topic in log.topics if topic not in left_out]):
             out.write(record.topic, record.typename, record.payload, record.log_ns, record.publish_ns)
     return path
-
-
-def calibrated(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as done:
-        main(["calibrate", *map(str, words)])
-    said = capsys.readouterr()
-    assert isinstance(done.value.code, int)
-    return done.value.code, said.out, said.err
 
 
 def test_a_short_run_with_wrong_timing_tells_the_right_one(
