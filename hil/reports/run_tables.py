@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import degrees
 from typing import Any
 
@@ -63,6 +63,7 @@ _COUNTS = {
     "latency_ms": "Latency",
 }
 _MOST_STOPS = 20
+_Columns = Mapping[str, tuple[str, Callable[[Any], str]]]
 _CERTIFICATE, _WORDS = "certificate", ("why", "assumes")
 _HEAD = (
     "scenario",
@@ -84,7 +85,7 @@ def summary_tables(summary: Mapping[str, Any]) -> str:
     left = dict(_leaves(summary, ""))
     for name in _HEAD:
         left.pop(name, None)
-    tables = [_quality(left), _bounds(left)]
+    tables = [*_estimates(left), _bounds(left)]
     for group, caption in _COUNTS.items():
         rows = [
             (label, _number(scale * left.pop(path)), unit)
@@ -126,16 +127,27 @@ def scale_of(quantity: str) -> float:
     return 1e3 if QUANTITIES[quantity][1].startswith("mm") else degrees(1.0)
 
 
-def _quality(left: dict[str, Any]) -> str:
-    """Errors of the estimates; a column or a row that nothing is known of is left out."""
-    columns = {
+def _estimates(left: dict[str, Any]) -> list[str]:
+    """How large the errors of the estimates are, and whether their deviations say so."""
+    over = f"over {left.pop('estimation.samples', 0)} samples"
+    errors = {
         "rmse": ("RMSE", _number),
         "max": ("largest", _number),
         "efficiency": ("× bound for random leaders", _number),
+    }
+    deviations = {
         "coverage_3sigma": ("within 3 σ", lambda share: f"{share:.2%}"),
         "nees": ("NEES", _number),
         "nees_limits": ("expected", lambda limits: " to ".join(map(_number, limits))),
     }
+    return [
+        _by_quantity(left, f"Errors of the estimates {over}", errors),
+        _by_quantity(left, f"Errors against their deviations {over}", deviations),
+    ]
+
+
+def _by_quantity(left: dict[str, Any], caption: str, columns: _Columns) -> str:
+    """Figures of each quantity; a column or a row that nothing is known of is left out."""
     held = {
         name: what for name, what in columns.items() if any(p.startswith(f"estimation.{name}.") for p in left)
     }
@@ -148,7 +160,6 @@ def _quality(left: dict[str, Any]) -> str:
             cells.append("–" if value is None else tell(scaled))
         if set(cells) - {"–"}:
             rows.append((f"{symbol} [{unit}]", *cells))
-    caption = f"Errors of the estimates over {left.pop('estimation.samples', 0)} samples"
     return table_html(caption, ("", *(label for label, _ in held.values())), rows)
 
 
