@@ -204,7 +204,7 @@ class _Windows:
         if abs(delay) > LONGEST_DELAY or lag > LONGEST_DELAY:
             return _Answer(delay, lag, -math.inf)
         _, rests = _fit(self.seen, self.means(delay, lag))
-        return _Answer(delay, lag, float(self._likelihood(rests)))
+        return _Answer(float(delay), float(lag), float(self._likelihood(rests)))
 
     def _step(self, here: _Answer) -> Vector | None:
         """Gauss-Newton step of delay and lag, the latter 0 where there is none."""

@@ -3,7 +3,8 @@
 Between slow sightings the motion at both ends tells little of what came in between. The signal, linear
 between samples, is integrated over the very interval, shifted by its delay; of a first-order lag that comes
 after it the integral is exact, too. Of what comes later still only a limit is known: every delay up to it is
-as likely as any other, so that the mean over some of them is taken, and what they differ by is what it may do.
+as likely as any other, so that the mean over some of them is taken, and what they differ by is what it may
+do.
 """
 
 from __future__ import annotations

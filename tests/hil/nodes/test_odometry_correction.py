@@ -79,7 +79,7 @@ def test_good_odometry_is_left_alone_and_nothing_is_done_unasked() -> None:
     state, found = lived(asked, 300, scale=1.0, late=0)
     untouched, expected = lived(plain, 300, scale=1.0, late=0)
     assert state.comparison.found.delay is not None
-    # What is left is what an alignment is uncertain by, and not used where a motion is not said to come later.
+    # What is left is what an alignment is uncertain by, and unused where no motion is said to come later.
     assert state.comparison.applied._replace(left=AS_TOLD) == IDEAL
     assert 0.0 < state.comparison.applied.left < 0.1
     assert untouched.comparison.poses == ()
