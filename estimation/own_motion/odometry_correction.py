@@ -28,11 +28,14 @@ EVERY_NS = 1_000_000_000
 """How often."""
 
 _DECIMATED_NS = 30_000_000  # between two poses or samples that are kept
-_SDS_LEFT = 3.0  # standard deviations that are left
+SDS_LEFT = 3.0
+"""Standard deviations of delay and lag together by which a motion that is corrected may come later still."""
+
+LEAST_LAG, LEAST_SCALE = 0.02, 0.02
+"""Below these [s], [1] nothing is worth correcting."""
+
 _SURE = 4.0  # standard deviations off the ideal, before a correction begins
 _LEAST_DELAY = 0.02  # [s]; below this nothing is worth correcting
-_LEAST_LAG = 0.02
-_LEAST_SCALE = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +110,7 @@ def _corrected(found: Alignment, before: Correction, given: InputTrust) -> Corre
     lag = time_constant_of(given, before)
     delay, applied = before.delay, lag
     if found.lag is not None and found.delay is not None:
-        applied = _applied(found.lag, lag, given.time_constant, _LEAST_LAG)
+        applied = _applied(found.lag, lag, given.time_constant, LEAST_LAG)
         # A delay that was told apart from another lag is none beside this one.
         late = Known(found.delay.value + found.lag.value - applied, found.delay.sd)
         delay = _applied(late, delay, 0.0, _LEAST_DELAY)
@@ -116,11 +119,11 @@ def _corrected(found: Alignment, before: Correction, given: InputTrust) -> Corre
         delay = _applied(late, delay, 0.0, _LEAST_DELAY)
     left = before.left
     if found.late is not None:
-        left = _SDS_LEFT * found.late.sd + abs(found.late.value - delay - applied)
+        left = SDS_LEFT * found.late.sd + abs(found.late.value - delay - applied)
     return Correction(
         delay,
-        _applied(found.scale_v, before.scale_v, 1.0, _LEAST_SCALE),
-        _applied(found.scale_u, before.scale_u, 1.0, _LEAST_SCALE),
+        _applied(found.scale_v, before.scale_v, 1.0, LEAST_SCALE),
+        _applied(found.scale_u, before.scale_u, 1.0, LEAST_SCALE),
         before.time_constant if applied == lag else applied,
         left,
     )
@@ -136,11 +139,17 @@ def correction_report(applied: Correction, given: InputTrust) -> dict[str, float
     }
 
 
+def is_surely_off(found: Known | None, ideal: float, least: float) -> bool:
+    """Whether a finding is off what is ideal by more than is worth a correction, and by more than chance."""
+    if found is None:
+        return False
+    off = abs(found.value - ideal)
+    return off > least and off > _SURE * found.sd
+
+
 def _applied(found: Known | None, before: float, ideal: float, least: float) -> float:
     if found is None:
         return before
-    off = abs(found.value - ideal)
     if before == ideal:
-        begins = off > least and off > _SURE * found.sd
-        return found.value if begins else ideal
-    return found.value if off > 0.5 * least else ideal
+        return found.value if is_surely_off(found, ideal, least) else ideal
+    return found.value if abs(found.value - ideal) > 0.5 * least else ideal
