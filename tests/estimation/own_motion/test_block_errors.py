@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from estimation.own_motion.block_errors import sandwich
+from formation.angles import FloatArray
 
 
 def spread_of_means(alike: int, block: float) -> tuple[float, float, float]:
     """True spread of means of errors that come in runs of so many, and its two estimates."""
     generator = np.random.default_rng(5)
-    times = np.arange(400) * 0.1
+    times: FloatArray = np.arange(400) * 0.1
     means, found = [], []
     for _ in range(200):
         errors = np.repeat(generator.normal(size=400 // alike), alike)
@@ -23,7 +24,7 @@ def spread_of_means(alike: int, block: float) -> tuple[float, float, float]:
 
 def test_errors_that_are_alike_for_a_while_widen_the_blocks_covariance_alone() -> None:
     true, independent, blocks = spread_of_means(alike=1, block=2.0)
-    assert (independent, blocks) == (pytest.approx(true, rel=0.15), pytest.approx(true, rel=0.15))
+    assert [independent, blocks] == [pytest.approx(true, rel=0.15), pytest.approx(true, rel=0.15)]
     true, independent, blocks = spread_of_means(alike=10, block=4.0)
     assert blocks == pytest.approx(true, rel=0.2)
     assert independent < 0.5 * true
@@ -31,7 +32,7 @@ def test_errors_that_are_alike_for_a_while_widen_the_blocks_covariance_alone() -
 
 def test_of_residuals_that_overlap_only_some_count() -> None:
     pulls = np.random.default_rng(1).normal(size=(50, 2))
-    times = np.arange(50) * 0.1
+    times: FloatArray = np.arange(50) * 0.1
     once, five = (sandwich(np.eye(2), pulls, times, 1.0, each) for each in (1, 5))
     assert once is not None
     assert five is not None

@@ -20,7 +20,8 @@ def signal(seed: int, *, held: bool) -> LaggedSignal:
     steps = np.unique(generator.integers(0, 20_000, 60))
     steps = steps[(steps < 8_000) | (steps > 11_000)]
     told = generator.normal(size=len(steps)) + 1j * generator.normal(size=len(steps))
-    return LaggedSignal(steps * FINE, told, held)
+    times: FloatArray = steps * FINE
+    return LaggedSignal(times, told, held)
 
 
 def fine_answer(given: LaggedSignal, lag: float) -> tuple[FloatArray, FloatArray]:

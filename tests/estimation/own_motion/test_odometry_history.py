@@ -193,4 +193,4 @@ def test_a_correction_takes_the_place_of_what_is_told_of_the_lag() -> None:
     trust = InputTrust(0.005, 0.03, time_constant=TIME_CONSTANT, scale_v=2.0, scale_u=0.5)
     at = answer_at(rows, ring, 500 * MS, TIME_CONSTANT)
     motion = follower_motion(rows, ring, 500 * MS, trust, Correction(scale_v=1.5))
-    assert (motion.v2, motion.u2) == (pytest.approx(3.0 * at.v2), pytest.approx(0.5 * at.u2))
+    assert [motion.v2, motion.u2] == [pytest.approx(3.0 * at.v2), pytest.approx(0.5 * at.u2)]
