@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from estimation.own_motion.block_errors import sandwich
-from formation.angles import FloatArray
 
 
 def spread_of_means(alike: int, block: float) -> tuple[float, float, float]:
     """True spread of means of errors that come in runs of so many, and its two estimates."""
     generator = np.random.default_rng(5)
-    times: FloatArray = np.arange(400) * 0.1
+    times = np.linspace(0.0, 39.9, 400)
     means, found = [], []
     for _ in range(200):
         errors = np.repeat(generator.normal(size=400 // alike), alike)
@@ -32,7 +31,7 @@ def test_errors_that_are_alike_for_a_while_widen_the_blocks_covariance_alone() -
 
 def test_of_residuals_that_overlap_only_some_count() -> None:
     pulls = np.random.default_rng(1).normal(size=(50, 2))
-    times: FloatArray = np.arange(50) * 0.1
+    times = np.linspace(0.0, 4.9, 50)
     once, five = (sandwich(np.eye(2), pulls, times, 1.0, each) for each in (1, 5))
     assert once is not None
     assert five is not None

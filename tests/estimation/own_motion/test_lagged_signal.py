@@ -20,7 +20,7 @@ def signal(seed: int, *, held: bool) -> LaggedSignal:
     steps = np.unique(generator.integers(0, 20_000, 60))
     steps = steps[(steps < 8_000) | (steps > 11_000)]
     told = generator.normal(size=len(steps)) + 1j * generator.normal(size=len(steps))
-    times: FloatArray = steps * FINE
+    times = np.asarray(steps * FINE, dtype=np.float64)
     return LaggedSignal(times, told, held)
 
 
