@@ -220,20 +220,22 @@ def _scored(
     dt = (due_ns - learned.at_ns) * _NS
     motion = _way_of(learned, measurement, dt)
     kept, found = math.exp(-dt / FORGOTTEN), learned_noise(learned, rules)
-    tried = rules.turn * TURN_LOWEST
-    for k in range(TURN_MEMBERS):
-        _score(bank, k, Trial(found._replace(q_u=tried), dt, kept, x, y, spread), motion, belief, estimator)
-        tried = tried * TURN_RATIO
-    tried = rules.speed * SPEED_LOWEST
-    for k in range(TURN_MEMBERS, MEMBERS):
-        _score(bank, k, Trial(found._replace(q_v=tried), dt, kept, x, y, spread), motion, belief, estimator)
-        tried = tried * SPEED_RATIO
+    tried_turn, tried_speed = rules.turn * TURN_LOWEST, rules.speed * SPEED_LOWEST
+    for k in range(MEMBERS):
+        noise = found
+        if k < TURN_MEMBERS:
+            noise = found._replace(q_u=tried_turn)
+            tried_turn = tried_turn * TURN_RATIO
+        else:
+            noise = found._replace(q_v=tried_speed)
+            tried_speed = tried_speed * SPEED_RATIO
+        _score(bank, k, Trial(noise, dt, kept, x, y, spread), motion, belief, estimator)
     speed = _taken(bank, rules.told.q_v / rules.speed, learned.speed, dt, False)
     turn = _taken(bank, rules.told.q_u / rules.turn, learned.turn, dt, True)
     return _emptied(learned._replace(speed=speed, turn=turn, at_ns=due_ns), measurement)
 
 
-@kernel(inline=False)
+@kernel
 def _score(
     bank: Rows[Member], k: int, trial: Trial, motion: FollowerMotion, belief: Gaussian, estimator: Filter
 ) -> None:

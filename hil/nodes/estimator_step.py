@@ -164,17 +164,18 @@ def with_noise(rules: Rules, noise: PoseNoise) -> Rules:
 
 @kernel
 def _take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
+    due = due_pose(known, memory, rules, capture_ns, seen)
     if rules.source == ODOMETRY:
         motion = by_odometry(known, memory, rules, capture_ns)
-        return take(known, memory, rules, measured(rules, capture_ns, seen, motion))
-    due = due_pose(known, memory, rules, capture_ns, seen)
-    if rules.source == AUTO:
+    elif rules.source == AUTO:
         motion = by_either(known, memory, rules, due)
     else:
         motion = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
         if known.own.length > 0 and capture_ns < own_point(memory.own, known.own, 0).capture_ns:
             motion = by_odometry(known, memory, rules, capture_ns)
     taken = take(known, memory, rules, measured(rules, capture_ns, seen, motion))
+    if rules.source == ODOMETRY:
+        return taken
     # A follower's pose that is not believed must not move its own track either.
     believed = taken.cause == BELIEVED or taken.cause == LEADER_OFF
     # Odometry that lies must not keep its judge from the poses that tell so: the track has a gate of its own.
