@@ -30,8 +30,16 @@ from estimation.models.measurement import (
     measure_world,
 )
 from estimation.own_motion.interval_motion import motion_between
-from estimation.own_motion.odometry_check import POSE, TRACK, OdometrySample, source_of, with_sample
-from estimation.own_motion.odometry_history import MotionSample, delay_ns, remember, sample_at, sample_place
+from estimation.own_motion.odometry_check import POSE, TRACK, OdometrySample, with_sample
+from estimation.own_motion.odometry_history import (
+    MotionSample,
+    answer_again,
+    delay_ns,
+    remember,
+    sample_at,
+    sample_place,
+    time_constant_of,
+)
 from estimation.own_motion.own_track import folded, motion_of, own_place, own_point, own_predicted
 from estimation.tracking.estimate import estimate_at, guessed_when_slow
 from estimation.tracking.follower_check import BELIEVED, MOUNT
@@ -72,6 +80,7 @@ from hil.nodes.estimator_records import (
     Told,
 )
 from hil.nodes.own_motion_step import (
+    answered_sample,
     by_either,
     by_either_at,
     by_odometry,
@@ -80,6 +89,8 @@ from hil.nodes.own_motion_step import (
     finds_odometry_noise,
     is_fresh,
     own_again,
+    source_now,
+    with_answer,
     with_judged_odometry,
     with_odometry_noise,
 )
@@ -278,8 +289,9 @@ def _learned(known: Known, memory: Memory, rules: Rules, verdict: int) -> Learne
 @kernel
 def _with_checked(known: Known, memory: Memory, rules: Rules, told: OdometrySample) -> Known:
     """Known with a sample of odometry in its check, and in what is found of its noise."""
-    check, by = known.odometry_check, known.correction
-    told = told._replace(v2=by.scale_v * told.v2, u2=by.scale_u * told.u2)
+    check = known.odometry_check
+    known = with_answer(known, rules, told)
+    told = answered_sample(known, rules, told)
     if check.heard and finds_odometry_noise(rules):
         known = with_odometry_noise(known, check.last, told, rules)
     known = known._replace(odometry_check=with_sample(check, memory.ways, told, rules.own_noise))
@@ -293,16 +305,19 @@ def _with_checked(known: Known, memory: Memory, rules: Rules, told: OdometrySamp
 @kernel
 def take_odometry(known: Known, memory: Memory, rules: Rules, told: OdometrySample) -> Known:
     """Take in a sample of odometry, and fold again what came after the sample before it."""
-    sample = MotionSample(told.stamp_ns, told.v2, told.u2)
+    sample = MotionSample(told.stamp_ns, told.v2, told.u2, 0.0, 0.0)
     if rules.source == AUTO:
         check = known.odometry_check
-        if source_of(check) == POSE and told.has_pose and check.last.has_pose:
+        if source_now(known, rules) == POSE and told.has_pose and check.last.has_pose:
             sample = by_pose(check.last, told)
         known = _with_checked(known, memory, rules, told)
     ring = remember(memory.history, known.odometry, sample, rules.span)
+    time_constant = time_constant_of(rules.trust, known.correction)
+    if time_constant > 0.0:
+        answer_again(memory.history, ring, sample.stamp_ns, time_constant)
     known = known._replace(odometry=ring)
     n = known.track.length
-    if not rules.reprocesses or n == 0 or source_of(known.odometry_check) == TRACK:
+    if not rules.reprocesses or n == 0 or source_now(known, rules) == TRACK:
         return known
     k, since_ns = sample_place(memory.history, ring, sample.stamp_ns), 0
     if k > 0:
