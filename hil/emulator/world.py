@@ -337,23 +337,21 @@ def _led(world: World, lab: Lab, memory: Memory) -> World:
 @kernel
 def _shown(world: World, lab: Lab, memory: Memory, number: int) -> bool:
     """Put into ``shown`` what the motion capture shows now, faults included; False for no frame at all."""
-    pair = Pair(_observed(memory, lab, number, 0), _observed(memory, lab, number, 1))
-    if size(memory.faults) > 0 and world.motion_since_ns >= 0:
-        t, last = (world.time_ns - world.motion_since_ns) * _NS, pair
-        if world.shown:
-            last = Pair(load(Pose, memory.shown, 0), load(Pose, memory.shown, 1))
-        shown = faulty(memory.faults, t, 1.0 / lab.mocap_rate, pair, last)
-        if shown.lost:
-            return False
-        pair = shown.pair
+    last = Pair(load(Pose, memory.shown, 0), load(Pose, memory.shown, 1))
+    for k in range(size(memory.robots)):
+        store(memory.shown, k, _observed(memory, lab, number, k))
+    if size(memory.faults) == 0 or world.motion_since_ns < 0:
+        return True
+    t = (world.time_ns - world.motion_since_ns) * _NS
+    pair = Pair(load(Pose, memory.shown, 0), load(Pose, memory.shown, 1))
+    shown = faulty(memory.faults, t, 1.0 / lab.mocap_rate, pair, last if world.shown else pair)
+    pair = last if shown.lost else shown.pair
     store(memory.shown, 0, pair.leader)
     store(memory.shown, 1, pair.follower)
-    for k in range(2, size(memory.robots)):
-        store(memory.shown, k, _observed(memory, lab, number, k))
-    return True
+    return not shown.lost
 
 
-@kernel(inline=False)
+@kernel
 def _observed(memory: Memory, lab: Lab, number: int, k: int) -> Pose:
     robots, mount = size(memory.robots), lab.follower_mount if k > 0 else lab.leader_mount
     row = (number % size(memory.shares)) * robots + k

@@ -14,14 +14,12 @@ from estimation.consistency.noise_estimate import (
     scaled_noise,
 )
 from estimation.consistency.process_estimate import (
-    MEMBERS,
     LearnedProcess,
-    Member,
     learn,
     learned_noise,
     restarted,
+    unlearned,
 )
-from estimation.filters.filter import Filter
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import (
     Measurement,
@@ -67,7 +65,7 @@ from estimation.tracking.tracker import (
 from estimation.tracking.travel_watch import watched
 from formation.kernel import kernel
 from formation.mount import robot_pose
-from formation.records import Rows, load, store
+from formation.records import Rows, store
 from formation.ring import place
 from hil.nodes.estimator_records import (
     AUTO,
@@ -134,27 +132,35 @@ def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen
         learned = noise_with_frame(known.noise, Moment(capture_ns, seen), gated, rules.noise_learning)
         after = after._replace(noise=learned)
         if is_another(learned):
-            after = _on_other_noise(after, memory, rules.filter)
+            after = _on_other_noise(after, memory, rules)
+        elif after.process.begun and not known.process.begun:
+            after = _on_this_noise(after)
     return taken._replace(known=after)
 
 
 @kernel
-def _on_other_noise(known: Known, memory: Memory, estimator: Filter) -> Known:
+def _on_other_noise(known: Known, memory: Memory, rules: Rules) -> Known:
     """The same where the noise turns out to be another one than all rests on that was learned before.
 
-    How the leader drives was weighed against that, and of a larger noise the belief is less certain.
+    How the leader drives was weighed against that, and of a larger noise the belief is less certain. A track
+    that has settled is not waited for again.
     """
     points, ring, noise = memory.points, known.track, known.noise
     if ring.length > 0 and noise.scale.position > noise.basis:
         by, point = noise.scale.position / noise.basis, newest(points, ring)
-        wider = estimator.widened(point.belief, by * by)
+        wider = rules.filter.widened(point.belief, by * by)
         # Innovations that leaned to one side were noise.
         point = point._replace(belief=wider, manoeuvre=steady())
         store(points, place(ring, points, ring.length - 1), point)
-    for k in range(MEMBERS):
-        store(memory.bank, k, load(Member, memory.bank, k)._replace(score=0.0))
-    noise = noise._replace(basis=noise.scale.position)
-    return known._replace(noise=noise, process=restarted(known.process)._replace(speed=1.0, turn=1.0))
+    process = unlearned(known.process, memory.bank, rules.process_learning)
+    return _on_this_noise(known._replace(process=process))
+
+
+@kernel
+def _on_this_noise(known: Known) -> Known:
+    """The same, all that is learned from now on resting on the noise as it is known now."""
+    noise = known.noise
+    return known._replace(noise=noise._replace(basis=noise.scale.position))
 
 
 @kernel
@@ -175,17 +181,18 @@ def with_noise(rules: Rules, noise: PoseNoise) -> Rules:
 
 @kernel
 def _take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
+    due = due_pose(known, memory, rules, capture_ns, seen)
     if rules.source == ODOMETRY:
         motion = by_odometry(known, memory, rules, capture_ns)
-        return take(known, memory, rules, measured(rules, capture_ns, seen, motion))
-    due = due_pose(known, memory, rules, capture_ns, seen)
-    if rules.source == AUTO:
+    elif rules.source == AUTO:
         motion = by_either(known, memory, rules, due)
     else:
         motion = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
         if known.own.length > 0 and capture_ns < own_point(memory.own, known.own, 0).capture_ns:
             motion = by_odometry(known, memory, rules, capture_ns)
     taken = take(known, memory, rules, measured(rules, capture_ns, seen, motion))
+    if rules.source == ODOMETRY:
+        return taken
     # A follower's pose that is not believed must not move its own track either.
     believed = taken.cause == BELIEVED or taken.cause == LEADER_OFF
     # Odometry that lies must not keep its judge from the poses that tell so: the track has a gate of its own.
