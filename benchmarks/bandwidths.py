@@ -167,13 +167,12 @@ def followed(
 ) -> int:
     """Take measurements in as a node does; an estimate for each."""
     memory = Memory(borrowed(points), borrowed(history), borrowed(own), borrowed(ways), borrowed(bank))
-    fixed, known = load(Rules, rules, 0), load(Known, knowns, 0)
+    fixed, tracked = load(Rules, rules, 0), borrowed(knowns)
     for k in range(size(seen)):
         measurement = load(Measurement, seen, k)
-        known = estimator_step.take(known, memory, fixed, measurement).known
-        told = estimator_step.estimate(known, memory.points, fixed, measurement.capture_ns)
+        estimator_step.take(tracked, memory, fixed, measurement)
+        told = estimator_step.estimate(load(Known, tracked, 0), memory.points, fixed, measurement.capture_ns)
         store(estimates, k, told.estimate)
-    store(knowns, 0, known)
     return size(seen)
 
 

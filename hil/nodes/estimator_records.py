@@ -95,7 +95,6 @@ class Known(NamedTuple):
 class Taken(NamedTuple):
     """What became of a frame or sighting: verdict and cause; ``late``: captured before the newest."""
 
-    known: Known
     verdict: int
     cause: int
     late: bool

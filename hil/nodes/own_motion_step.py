@@ -13,7 +13,7 @@ from estimation.own_motion.odometry_check import (
     way_between,
 )
 from estimation.own_motion.odometry_history import InputTrust, MotionSample, follower_motion
-from estimation.own_motion.odometry_noise import noise_with_sample, noise_with_window, with_found_noise
+from estimation.own_motion.odometry_noise import noise_with_window, with_found_noise
 from estimation.own_motion.own_track import (
     OwnPoint,
     motion_of,
@@ -25,7 +25,7 @@ from estimation.own_motion.own_track import (
     own_reprocessed,
 )
 from formation.kernel import kernel
-from formation.records import store
+from formation.records import Rows, load, store, within
 from formation.ring import place
 from hil.nodes.estimator_records import AUTO, FUSED, MOCAP, Known, Memory, Rules
 
@@ -107,19 +107,25 @@ def by_either_at(known: Known, memory: Memory, rules: Rules, capture_ns: int) ->
 
 
 @kernel
-def with_judged_odometry(known: Known, memory: Memory, rules: Rules) -> Known:
-    """Known with what the follower's own track has to say of odometry, and of how far it is off."""
+def with_judged_odometry(knowns: Rows[Known], memory: Memory, rules: Rules) -> None:
+    """Take in what the follower's own track has to say of odometry, and of how far it is off."""
+    if awaits_track(load(Known, knowns, 0).odometry_check):
+        _judge_odometry(knowns, memory, rules)
+
+
+@kernel(inline=False)
+def _judge_odometry(knowns: Rows[Known], memory: Memory, rules: Rules) -> None:
+    known = load(Known, knowns, 0)
     before = known.odometry_check
-    if not awaits_track(before):
-        return known
     after = with_own_track(before, memory.ways, memory.own, known.own, rules.own_noise, _trust(known, rules))
-    known = known._replace(odometry_check=after)
+    store(within(Known, knowns, 0, "odometry_check"), 0, after)
     if not finds_odometry_noise(rules) or not before.windowed or not after.windowed:
-        return known
-    if after.since.stamp_ns <= before.since.stamp_ns:
-        return known
-    noise = noise_with_window(known.odometry_noise, before.since, after.since, rules.trust, rules.own_noise)
-    return known._replace(odometry_noise=noise)
+        return
+    if after.since.stamp_ns > before.since.stamp_ns:
+        noise = noise_with_window(
+            known.odometry_noise, before.since, after.since, rules.trust, rules.own_noise
+        )
+        store(within(Known, knowns, 0, "odometry_noise"), 0, noise)
 
 
 @kernel
@@ -129,19 +135,12 @@ def finds_odometry_noise(rules: Rules) -> bool:
 
 
 @kernel
-def with_odometry_noise(known: Known, last: OdometrySample, told: OdometrySample, rules: Rules) -> Known:
-    """Known with what a sample that follows on another tells of odometry's noise."""
-    noise = noise_with_sample(known.odometry_noise, last, told, rules.trust, rules.own_noise)
-    return known._replace(odometry_noise=noise)
-
-
-@kernel
 def take_not_finite(known: Known, now_ns: int) -> Known:
     """Take note of odometry that came with a number that is none."""
     return known._replace(odometry_check=known.odometry_check._replace(bad_ns=now_ns))
 
 
-@kernel
+@kernel(inline=False)
 def own_again(known: Known, memory: Memory, rules: Rules, since_ns: int) -> None:
     """Fold the follower's own track anew from a time on, with the odometry that is now known at its poses."""
     ring, noise = known.own, rules.own_noise

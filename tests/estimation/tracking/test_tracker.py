@@ -34,7 +34,6 @@ from estimation.tracking.tracker import (
     point_at,
     reprocessed,
     status_of,
-    with_motion,
 )
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
