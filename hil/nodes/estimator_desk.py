@@ -135,6 +135,7 @@ NOTHING_KNOWN = Known(
     travel=NO_TRAVEL,
     mount_check=NO_MOUNT_CHECK,
     odometry_noise=ODOMETRY_AS_TOLD,
+    answer=MotionSample(0, 0.0, 0.0),
 )
 
 

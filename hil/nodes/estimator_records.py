@@ -76,7 +76,7 @@ class Known(NamedTuple):
     ``watched_ns``: capture of the first frame since when odometry is missed, 0 before. ``noise``: of
     measurements, as they tell it. ``process``: what is known of how the leader drives. ``travel``: which
     way the leader went, where it is seen in the world. ``mount_check``: what is left of the follower's mount.
-    ``odometry_noise``: what odometry shows to be its errors.
+    ``odometry_noise``: what odometry shows to be its errors. ``answer``: of a lag to its newest sample.
     """
 
     track: Ring
@@ -90,6 +90,7 @@ class Known(NamedTuple):
     travel: TravelWatch
     mount_check: MountCheck
     odometry_noise: OdometryNoise
+    answer: MotionSample
 
 
 class Taken(NamedTuple):

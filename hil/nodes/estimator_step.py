@@ -25,8 +25,16 @@ from estimation.models.measurement import (
     measure_world,
 )
 from estimation.own_motion.interval_motion import motion_between
-from estimation.own_motion.odometry_check import POSE, TRACK, OdometrySample, source_of, with_sample
-from estimation.own_motion.odometry_history import MotionSample, delay_ns, remember, sample_at, sample_place
+from estimation.own_motion.odometry_check import POSE, TRACK, OdometrySample, with_sample
+from estimation.own_motion.odometry_history import (
+    MotionSample,
+    answer_again,
+    delay_ns,
+    remember,
+    sample_at,
+    sample_place,
+    time_constant_of,
+)
 from estimation.own_motion.odometry_noise import noise_with_sample
 from estimation.own_motion.own_track import folded, motion_of, own_place, own_point, own_predicted
 from estimation.tracking.estimate import estimate_at, guessed_when_slow
@@ -67,6 +75,7 @@ from hil.nodes.estimator_records import (
 )
 from hil.nodes.noise_step import learn_noise, with_noise
 from hil.nodes.own_motion_step import (
+    answered_sample,
     by_either,
     by_either_at,
     by_odometry,
@@ -75,6 +84,8 @@ from hil.nodes.own_motion_step import (
     finds_odometry_noise,
     is_fresh,
     own_again,
+    source_now,
+    with_answer,
     with_judged_odometry,
 )
 
@@ -100,7 +111,9 @@ def take_frame(knowns: Rows[Known], memory: Memory, rules: Rules, capture_ns: in
     It is taken with the noise as known from the frames before, and keeps that if it is folded again.
     """
     learns = rules.noise_learning.learns
-    using = with_noise(rules, scaled_noise(rules.noise, load(Known, knowns, 0).noise)) if learns else rules
+    known = load(Known, knowns, 0)
+    begun = known.process.begun
+    using = with_noise(rules, scaled_noise(rules.noise, known.noise)) if learns else rules
     taken = _take_frame(knowns, memory, using, capture_ns, seen)
     if taken.late or taken.verdict == DUPLICATE or taken.verdict == LATE:
         return taken
@@ -110,7 +123,8 @@ def take_frame(knowns: Rows[Known], memory: Memory, rules: Rules, capture_ns: in
         check = load(MountCheck, checks, 0)
         store(checks, 0, mount_watched(check, capture_ns, seen.follower, using.noise, jumped))
     if learns:
-        learn_noise(knowns, memory, rules, Moment(capture_ns, seen), taken.cause != BELIEVED)
+        begins = load(Known, knowns, 0).process.begun and not begun
+        learn_noise(knowns, memory, rules, Moment(capture_ns, seen), taken.cause != BELIEVED, begins)
     return taken
 
 
@@ -232,8 +246,10 @@ def _learn(knowns: Rows[Known], memory: Memory, rules: Rules, verdict: int) -> N
 def _check(knowns: Rows[Known], memory: Memory, rules: Rules, told: OdometrySample) -> None:
     """Take a sample of odometry into its check, and into what is found of its noise."""
     known = load(Known, knowns, 0)
-    check, by = known.odometry_check, known.correction
-    told = told._replace(v2=by.scale_v * told.v2, u2=by.scale_u * told.u2)
+    check = known.odometry_check
+    known = with_answer(known, rules, told)
+    store(within(Known, knowns, 0, "answer"), 0, known.answer)
+    told = answered_sample(known, rules, told)
     if check.heard and finds_odometry_noise(rules):
         noise = noise_with_sample(known.odometry_noise, check.last, told, rules.trust, rules.own_noise)
         store(within(Known, knowns, 0, "odometry_noise"), 0, noise)
@@ -248,18 +264,22 @@ def _check(knowns: Rows[Known], memory: Memory, rules: Rules, told: OdometrySamp
 @kernel
 def take_odometry(knowns: Rows[Known], memory: Memory, rules: Rules, told: OdometrySample) -> None:
     """Take in a sample of odometry, and fold again what came after the sample before it."""
-    sample = MotionSample(told.stamp_ns, told.v2, told.u2)
+    sample = MotionSample(told.stamp_ns, told.v2, told.u2, 0.0, 0.0)
     if rules.source == AUTO:
-        check = load(Known, knowns, 0).odometry_check
-        if source_of(check) == POSE and told.has_pose and check.last.has_pose:
+        known = load(Known, knowns, 0)
+        check = known.odometry_check
+        if source_now(known, rules) == POSE and told.has_pose and check.last.has_pose:
             sample = by_pose(check.last, told)
         _check(knowns, memory, rules, told)
     known = load(Known, knowns, 0)
     ring = remember(memory.history, known.odometry, sample, rules.span)
+    time_constant = time_constant_of(rules.trust, known.correction)
+    if time_constant > 0.0:
+        answer_again(memory.history, ring, sample.stamp_ns, time_constant)
     store(within(Known, knowns, 0, "odometry"), 0, ring)
     known = known._replace(odometry=ring)
     n = known.track.length
-    if not rules.reprocesses or n == 0 or source_of(known.odometry_check) == TRACK:
+    if not rules.reprocesses or n == 0 or source_now(known, rules) == TRACK:
         return
     k, since_ns = sample_place(memory.history, ring, sample.stamp_ns), 0
     if k > 0:

@@ -9,8 +9,7 @@ from estimation.consistency.noise_estimate import (
     noise_with_frame,
     noise_with_sighting,
 )
-from estimation.consistency.process_estimate import MEMBERS, Member, restarted
-from estimation.filters.filter import Filter
+from estimation.consistency.process_estimate import unlearned
 from estimation.models.measurement import PoseNoise
 from estimation.tracking.manoeuvre import steady
 from estimation.tracking.track_point import DUPLICATE, LATE
@@ -22,33 +21,41 @@ from hil.nodes.estimator_records import Known, Memory, Rules, Taken
 
 
 @kernel
-def learn_noise(knowns: Rows[Known], memory: Memory, rules: Rules, moment: Moment, gated: bool) -> None:
-    """Learn of the noise from a frame in its order; ``gated``: whether it was not believed."""
+def learn_noise(
+    knowns: Rows[Known], memory: Memory, rules: Rules, moment: Moment, gated: bool, begins: bool
+) -> None:
+    """Learn of the noise from a frame in its order; ``gated``: whether it was not believed.
+
+    ``begins``: whether with this frame it begins to be learned how the leader drives.
+    """
     noises = within(Known, knowns, 0, "noise")
     before = load(NoiseEstimate, noises, 0)
     store(noises, 0, noise_with_frame(before, moment, gated, rules.noise_learning))
-    if is_another(load(NoiseEstimate, noises, 0)):
-        _on_other_noise(knowns, memory, rules.filter)
+    after = load(NoiseEstimate, noises, 0)
+    if is_another(after):
+        _go_on_with_other_noise(knowns, memory, rules)
+    elif begins:
+        # All that is learned from now on rests on the noise as it is known now.
+        store(noises, 0, after._replace(basis=after.scale.position))
 
 
 @kernel(inline=False)
-def _on_other_noise(knowns: Rows[Known], memory: Memory, estimator: Filter) -> None:
+def _go_on_with_other_noise(knowns: Rows[Known], memory: Memory, rules: Rules) -> None:
     """Go on where the noise turns out to be another one than all rests on that was learned before.
 
-    How the leader drives was weighed against that, and of a larger noise the belief is less certain.
+    How the leader drives was weighed against that, and of a larger noise the belief is less certain. A track
+    that has settled is not waited for again.
     """
     known = load(Known, knowns, 0)
     points, ring, noise = memory.points, known.track, known.noise
     if ring.length > 0 and noise.scale.position > noise.basis:
         by, point = noise.scale.position / noise.basis, newest(points, ring)
-        wider = estimator.widened(point.belief, by * by)
+        wider = rules.filter.widened(point.belief, by * by)
         # Innovations that leaned to one side were noise.
         point = point._replace(belief=wider, manoeuvre=steady())
         store(points, place(ring, points, ring.length - 1), point)
-    for k in range(MEMBERS):
-        store(memory.bank, k, load(Member, memory.bank, k)._replace(score=0.0))
+    process = unlearned(known.process, memory.bank, rules.process_learning)
     noise = noise._replace(basis=noise.scale.position)
-    process = restarted(known.process)._replace(speed=1.0, turn=1.0)
     store(knowns, 0, known._replace(noise=noise, process=process))
 
 
