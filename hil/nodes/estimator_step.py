@@ -21,6 +21,7 @@ from estimation.consistency.process_estimate import (
     learned_noise,
     restarted,
 )
+from estimation.consistency.slip_estimate import learn_slip, with_slip
 from estimation.filters.filter import Filter
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import (
@@ -30,6 +31,7 @@ from estimation.models.measurement import (
     measure_body_anchored,
     measure_body_from_mocap,
     measure_world,
+    seen_in_range,
 )
 from estimation.own_motion.interval_motion import motion_between
 from estimation.own_motion.odometry_check import POSE, TRACK, OdometrySample, source_of, with_sample
@@ -80,7 +82,6 @@ from hil.nodes.own_motion_step import (
     by_pose,
     due_pose,
     finds_odometry_noise,
-    is_fresh,
     own_again,
     with_judged_odometry,
     with_odometry_noise,
@@ -199,7 +200,8 @@ def measured(rules: Rules, capture_ns: int, seen: PairSeen, motion: FollowerMoti
     leader = (seen.leader_x, seen.leader_y)
     if rules.filter.in_world:
         return measure_world(capture_ns, leader, seen.follower, rules.noise, motion)
-    if rules.source == MOCAP:
+    # Where a frame shows the follower's own pose, no odometry knows better how far it has turned.
+    if rules.source == MOCAP or rules.source == AUTO:
         return measure_body_anchored(capture_ns, leader, seen.follower, rules.noise, motion)
     return measure_body_from_mocap(capture_ns, leader, seen.follower, rules.noise, motion)
 
@@ -210,13 +212,14 @@ def _with_way(known: Known, memory: Memory, rules: Rules, measurement: Measureme
     if rules.filter.in_world or measurement.anchored or k == 0 or known.odometry.length == 0:
         return measurement
     to_ns = measurement.capture_ns
-    by_sample = rules.source == ODOMETRY or not measurement.framed
-    if not by_sample and (rules.source != AUTO or not is_fresh(known, rules, to_ns)):
+    if measurement.framed and rules.source != ODOMETRY:
         return measurement._replace(has_way=False)
     from_ns = capture_at(memory.points, known.track, k - 1)
     if from_ns >= to_ns:
         return measurement
     way = motion_between(memory.history, known.odometry, (from_ns, to_ns), rules.trust, known.correction)
+    if rules.learns_slip:
+        way = with_slip(way, known.slip)
     return measurement._replace(has_way=True, way=way)
 
 
@@ -237,6 +240,10 @@ def take(known: Known, memory: Memory, rules: Rules, measurement: Measurement) -
         _shorten_way(known, memory, rules, measurement.capture_ns)
     if learning.on and not late:
         known = known._replace(process=_learned(known, memory, rules, added.verdict))
+    if rules.learns_slip and not late and added.ring.length > 1:
+        # Of the newest odometry may still come; the one before it has been folded with all there is.
+        settled = point_at(points, added.ring, added.ring.length - 2)
+        known = known._replace(slip=learn_slip(known.slip, memory.bank, settled, rules.filter))
     if rules.filter.in_world and not late:
         point, settings = newest(points, added.ring), rules.settings
         known = known._replace(travel=watched(known.travel, point, settings.lost_after, rules.filter.limits))
@@ -261,10 +268,12 @@ def _learned(known: Known, memory: Memory, rules: Rules, verdict: int) -> Learne
     if verdict != USED:
         return known.process
     point = newest(memory.points, known.track)
-    # Where commands stand in for motion, innovations tell how the follower obeys, not how the leader drives.
-    obeys = point.measurement.has_way and rules.trust.lag > 0.0
-    if obeys or point.period > SELDOM:
+    if point.period > SELDOM:
         return known.process
+    if point.measurement.has_way and rules.trust.lag > 0.0:
+        # Where commands stand in for motion, what is seen across the line of sight tells how the follower
+        # obeys, not how the leader drives.
+        point = point._replace(measurement=seen_in_range(point.measurement))
     return learn(known.process, memory.bank, point, rules.process_learning, rules.filter)
 
 
@@ -381,4 +390,5 @@ def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) 
     waits = status in (TRACKING, INITIALISING)
     if waits and rules.mounts.stops and is_off(known.mount_check):
         status, cause = REJECTING, MOUNT
+    point = point._replace(belief=rules.filter.told_speed(point.belief))
     return Told(guessed_when_slow(estimate_at(point, status), rules.filter.limits.v_eps), cause)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from estimation.consistency.slip_estimate import with_slip
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import PairSeen
 from estimation.own_motion.judged_odometry import age_of, aged, fresh_for, is_better, with_own_track
@@ -35,7 +36,8 @@ _NS = 1e-9
 @kernel
 def by_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
     """Motion of the follower as odometry tells it, put right where that is known to be wrong."""
-    return follower_motion(memory.history, known.odometry, capture_ns, rules.trust, known.correction)
+    motion = follower_motion(memory.history, known.odometry, capture_ns, rules.trust, known.correction)
+    return with_slip(motion, known.slip) if rules.learns_slip else motion
 
 
 @kernel
@@ -124,8 +126,8 @@ def with_judged_odometry(known: Known, memory: Memory, rules: Rules) -> Known:
 
 @kernel
 def finds_odometry_noise(rules: Rules) -> bool:
-    """Whether the noise of odometry is found; along the follower's axes slip and lag are told for it."""
-    return rules.noise_learning.learns and rules.filter.in_world
+    """Whether the noise of odometry is found by the own track; of commands in its place a lag is told."""
+    return rules.noise_learning.learns and rules.trust.lag == 0.0
 
 
 @kernel
