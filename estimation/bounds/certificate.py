@@ -331,8 +331,11 @@ def _k_u_star(given: Assumptions) -> Claim:
         )
         return Claim({}, (*assumes[:2], "a constant v1"), why)
     margin = steering_margin(given.mu1, given.spacing, speeds.lowest)
+    below = "lower: below it one stable orbit in a set that keeps all its motions"
     lower = (
-        "lower: below it one stable orbit in the invariant set is proved (contraction in a constant metric)"
+        f"{below} is proved: contraction in a metric, in interval arithmetic over the whole set"
+        if margin.proved
+        else f"{below} is computed, not proved: contraction in a constant metric"
     )
     upper = "upper: above it a periodic steering is known that throws the pair off"
     return Claim({"lower": margin.lower, "upper": margin.upper}, (*assumes, lower, upper))

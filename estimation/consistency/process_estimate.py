@@ -41,8 +41,8 @@ errors larger than reported by a tenth; for those that steer smoothly what is re
 
 _TOLD_SD = math.log(10.0)  # what is told is known to a factor of ten
 _SPEED_FALLING, _TURN_FALLING = 0.75, 0.25  # [1/s]: who drives calmly for a while need not be calm
-_INTERVAL_NS = 30_000_000
-_SETTLING_NS = 1_000_000_000
+# Neither is a multiple of a usual spacing of frames, so that a microsecond doesn't matter.
+_INTERVAL_NS, _SETTLING_NS = 28_300_000, 1_003_000_000
 _LARGEST_NIS = 400.0  # a member further off starts again from the main filter
 _NS = 1e-9
 _SAME = 1e-6  # [s]
@@ -168,6 +168,29 @@ def restarted(learned: LearnedProcess) -> LearnedProcess:
 
 
 @kernel
+def unlearned(learned: LearnedProcess, bank: Rows[Member], rules: ProcessLearning) -> LearnedProcess:
+    """What is kept when all was weighed against a wrong noise: what was found, in the place of what is told.
+
+    A bank that runs begins at once with the main filter's belief, which knows of the noise.
+    """
+    _score_as_found(bank, learned.turn * rules.told.q_u / rules.turn, rules.told.q_u / rules.turn, True)
+    _score_as_found(bank, learned.speed * rules.told.q_v / rules.speed, rules.told.q_v / rules.speed, False)
+    return learned._replace(begun=False)
+
+
+@kernel
+def _score_as_found(bank: Rows[Member], found: float, told: float, turn: bool) -> None:
+    """Scores by which a found bandwidth is as likely as the told one was, and as uncertain."""
+    first, count, tried, ratio = TURN_MEMBERS, SPEED_MEMBERS, SPEED_LOWEST, SPEED_RATIO
+    if turn:
+        first, count, tried, ratio = 0, TURN_MEMBERS, TURN_LOWEST, TURN_RATIO
+    for k in range(first, first + count):
+        score = _prior(math.log(tried / found)) - _prior(math.log(tried / told))
+        store(bank, k, load(Member, bank, k)._replace(score=score))
+        tried = tried * ratio
+
+
+@kernel
 def _waiting(
     learned: LearnedProcess, bank: Rows[Member], measurement: Measurement, belief: Gaussian, settled: bool
 ) -> LearnedProcess:
@@ -220,20 +243,22 @@ def _scored(
     dt = (due_ns - learned.at_ns) * _NS
     motion = _way_of(learned, measurement, dt)
     kept, found = math.exp(-dt / FORGOTTEN), learned_noise(learned, rules)
-    tried = rules.turn * TURN_LOWEST
-    for k in range(TURN_MEMBERS):
-        _score(bank, k, Trial(found._replace(q_u=tried), dt, kept, x, y, spread), motion, belief, estimator)
-        tried = tried * TURN_RATIO
-    tried = rules.speed * SPEED_LOWEST
-    for k in range(TURN_MEMBERS, MEMBERS):
-        _score(bank, k, Trial(found._replace(q_v=tried), dt, kept, x, y, spread), motion, belief, estimator)
-        tried = tried * SPEED_RATIO
+    tried_turn, tried_speed = rules.turn * TURN_LOWEST, rules.speed * SPEED_LOWEST
+    for k in range(MEMBERS):
+        noise = found
+        if k < TURN_MEMBERS:
+            noise = found._replace(q_u=tried_turn)
+            tried_turn = tried_turn * TURN_RATIO
+        else:
+            noise = found._replace(q_v=tried_speed)
+            tried_speed = tried_speed * SPEED_RATIO
+        _score(bank, k, Trial(noise, dt, kept, x, y, spread), motion, belief, estimator)
     speed = _taken(bank, rules.told.q_v / rules.speed, learned.speed, dt, False)
     turn = _taken(bank, rules.told.q_u / rules.turn, learned.turn, dt, True)
     return _emptied(learned._replace(speed=speed, turn=turn, at_ns=due_ns), measurement)
 
 
-@kernel(inline=False)
+@kernel
 def _score(
     bank: Rows[Member], k: int, trial: Trial, motion: FollowerMotion, belief: Gaussian, estimator: Filter
 ) -> None:
@@ -264,19 +289,34 @@ def _taken(bank: Rows[Member], told: float, before: float, dt: float, turn: bool
         here = _posterior(bank, first + k, lowest + step * k)
         if here > highest:
             best, highest = k, here
-    off = lowest + step * best
-    if 0 < best < count - 1:
-        below = highest - _posterior(bank, first + best - 1, off - step)
-        above = highest - _posterior(bank, first + best + 1, off + step)
-        off += _vertex(below, above, step)
-    return max(SHARE * math.exp(off), before * math.exp(-falling * dt))
+    peak = lowest + step * best
+    inside = 0 < best < count - 1
+    if inside:
+        below = highest - _posterior(bank, first + best - 1, peak - step)
+        above = highest - _posterior(bank, first + best + 1, peak + step)
+        peak += _vertex(below, above, step)
+    total, mean = 0.0, 0.0
+    for k in range(count):
+        off = lowest + step * k
+        weight = math.exp(_posterior(bank, first + k, off) - highest)
+        # Around the peak members stand too far apart to tell where it is by their weights alone.
+        near = inside and best - 1 <= k <= best + 1
+        total += weight
+        mean += weight * (peak if near else off)
+    return max(SHARE * math.exp(mean / total), before * math.exp(-falling * dt))
 
 
 @kernel
 def _posterior(bank: Rows[Member], k: int, off: float) -> float:
     """Score of a member with what is told: its logarithm is off by this much from the told one."""
+    return load(Member, bank, k).score + _prior(off)
+
+
+@kernel
+def _prior(off: float) -> float:
+    """Logarithm of how likely noise is whose logarithm is off by this much from the told one."""
     apart = off / _TOLD_SD
-    return load(Member, bank, k).score - math.log(1.0 + 0.5 * apart * apart)
+    return -math.log(1.0 + 0.5 * apart * apart)
 
 
 @kernel

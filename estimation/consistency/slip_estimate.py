@@ -6,7 +6,8 @@ follower does not know of its own turning. Some filters share all but the deviat
 steps of a constant ratio, and predict over some tenths of a second: errors of wheels last about that long,
 and look harmless from one sample to the next. The score of each is the logarithm of its likelihood, forgotten
 over half a minute; the scale that is taken is the mean of their logarithms, weighed by likelihood and by what
-is told.
+is told. It rises at once, and falls as slowly as scores are forgotten: wheels that have not slipped for a
+while may yet.
 """
 
 from __future__ import annotations
@@ -120,7 +121,10 @@ def _scored(learned: LearnedSlip, bank: Rows[Member], point: TrackPoint, estimat
         apart = apart + math.log(SLIP_RATIO)
     nowhere = FollowerMotion(0.0, 0.0, 0.0, 0.0)
     return learned._replace(
-        scale=math.exp(sum_ / total), at_ns=point.measurement.capture_ns, way_s=0.0, way=nowhere
+        scale=max(math.exp(sum_ / total), learned.scale * kept),
+        at_ns=point.measurement.capture_ns,
+        way_s=0.0,
+        way=nowhere,
     )
 
 

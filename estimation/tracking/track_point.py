@@ -40,6 +40,9 @@ RESTARTED = Verdict.RESTARTED.value
 LATE = Verdict.LATE.value
 DUPLICATE = Verdict.DUPLICATE.value
 
+SAME_NS = 100_000
+"""Captures this close are one: no motion capture takes 10,000 frames a second, but some send one twice."""
+
 
 class JumpUncertainty(NamedTuple):
     """A jump that was followed without being explained: either where it led is wrong, or where it began.

@@ -34,6 +34,7 @@ from estimation.tracking.track_point import (
     GATED,
     LATE,
     RESTARTED,
+    SAME_NS,
     USED,
     JumpUncertainty,
     TrackPoint,
@@ -315,12 +316,12 @@ def add(
 ) -> Added:
     """Fold a measurement in at its place in time; tell what became of it.
 
-    A measurement of a capture time that the track has is a DUPLICATE, one from before the window or before
-    the track began is LATE: both leave the track as it is. The verdict of one folded in late is that at its
-    own place. Points that come too close together for the whole window to fit push the oldest out.
+    A measurement of a capture that the track has is a DUPLICATE, one from before the window or before the
+    track began is LATE: both leave the track as it is. The verdict of one folded in late is that at its own
+    place. Points that come too close together for the whole window to fit push the oldest out.
     """
     n = ring.length
-    if n == 0 or measurement.capture_ns <= capture_at(points, ring, n - 1):
+    if n == 0 or measurement.capture_ns < capture_at(points, ring, n - 1) + SAME_NS:
         return _inserted(points, ring, measurement, settings, estimator)
     point = follow(point_at(points, ring, n - 1), measurement, settings, estimator)
     if n == size(points):
@@ -333,22 +334,22 @@ def add(
 def _inserted(
     points: Rows[TrackPoint], ring: Ring, measurement: Measurement, settings: TrackSettings, estimator: Filter
 ) -> Added:
-    """Fold in a measurement that is the first, or not the newest."""
+    """Fold in a measurement that is the first, or hardly newer than the newest."""
     n, capture_ns = ring.length, measurement.capture_ns
     if n == 0:
         store(points, place(ring, points, 0), begun(measurement, estimator))
         return Added(Ring(ring.first, 1), RESTARTED, BELIEVED)
     k = place_of(points, ring, capture_ns)
-    if capture_at(points, ring, k) == capture_ns:
-        return Added(ring, DUPLICATE, BELIEVED)
+    for at in range(max(0, k - 1), min(n, k + 1)):
+        if abs(capture_at(points, ring, at) - capture_ns) < SAME_NS:
+            return Added(ring, DUPLICATE, BELIEVED)
     full = n == size(points)
-    least = 2 if full else 1
-    if k < least or capture_ns < capture_at(points, ring, n - 1) - window_ns(settings):
+    if k < (2 if full else 1) or capture_ns < capture_at(points, ring, n - 1) - window_ns(settings):
         return Added(ring, LATE, BELIEVED)
     if full:
         ring, n, k = Ring(place(ring, points, 1), n - 1), n - 1, k - 1
-    for at in range(n, k, -1):
-        store(points, place(ring, points, at), point_at(points, ring, at - 1))
+    for after in range(n, k, -1):
+        store(points, place(ring, points, after), point_at(points, ring, after - 1))
     here = point_at(points, ring, k)
     store(points, place(ring, points, k), here._replace(measurement=measurement, noise=estimator.noise))
     ring = Ring(ring.first, n + 1)

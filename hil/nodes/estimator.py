@@ -9,6 +9,7 @@ from estimation.bounds.certified import Certain, Failed
 from estimation.own_motion.odometry_correction import (
     NOTHING_SEEN,
     OdometryComparison,
+    correction_report,
     reconsidered,
     with_pose,
     with_sample,
@@ -161,7 +162,7 @@ class EstimatorNode:
         if self.aligns:
             frame = memory.frame
             with_frame = with_pose(state.comparison, frame.capture_ns, frame.seen.follower)
-            state.comparison = reconsidered(with_frame, now_ns)
+            state.comparison = reconsidered(with_frame, now_ns, self.rules.step.trust)
             memory.correct(state.comparison.applied)
         length = memory.take_frame(now_ns)
         if self.certifying is not None and memory.notes.verdict not in _UNUSED:
@@ -243,8 +244,7 @@ class EstimatorNode:
         values |= noise_report(known.noise, self.rules.step.noise_learning)
         values |= process_report(known.process, self.rules.step.process_learning)
         if self.aligns:
-            applied = state.comparison.applied._asdict()
-            values |= {f"odometry.{name}": value for name, value in applied.items()}
+            values |= correction_report(state.comparison.applied, self.rules.step.trust)
         values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)
         values |= named_findings(self.findings(state, now_ns))
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)

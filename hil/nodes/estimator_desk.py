@@ -137,6 +137,7 @@ NOTHING_KNOWN = Known(
     mount_check=NO_MOUNT_CHECK,
     odometry_noise=ODOMETRY_AS_TOLD,
     slip=SLIP_AS_TOLD,
+    answer=MotionSample(0, 0.0, 0.0),
 )
 
 

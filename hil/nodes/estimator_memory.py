@@ -16,7 +16,13 @@ from estimation.consistency.process_estimate import Member
 from estimation.consistency.slip_estimate import BANK
 from estimation.filters.filter import Filter
 from estimation.own_motion.odometry_check import OdometrySample, WayEntry
-from estimation.own_motion.odometry_history import Correction, History, MotionSample
+from estimation.own_motion.odometry_history import (
+    Correction,
+    History,
+    MotionSample,
+    answer_again,
+    time_constant_of,
+)
 from estimation.own_motion.own_track import OwnPoint
 from estimation.time.host_time import TimeRows, time_rows
 from estimation.tracking.estimate import Estimate
@@ -235,7 +241,11 @@ class EstimatorMemory:
 
     def correct(self, correction: Correction) -> None:
         """Correct odometry so from now on."""
-        store(self.desk.known, 0, self.known._replace(correction=correction))
+        known, trust = self.known, self.rules.step.trust
+        time_constant = time_constant_of(trust, correction)
+        if time_constant not in (0.0, time_constant_of(trust, known.correction)):
+            answer_again(self.desk.history, known.odometry, 0, time_constant)
+        store(self.desk.known, 0, known._replace(correction=correction))
 
     @property
     def known(self) -> Known:

@@ -80,6 +80,7 @@ class Known(NamedTuple):
     measurements, as they tell it. ``process``: what is known of how the leader drives. ``travel``: which
     way the leader went, where it is seen in the world. ``mount_check``: what is left of the follower's mount.
     ``odometry_noise``: what odometry shows to be its errors. ``slip``: what of them sightings show.
+    ``answer``: of a lag to its newest sample.
     """
 
     track: Ring
@@ -94,6 +95,7 @@ class Known(NamedTuple):
     mount_check: MountCheck
     odometry_noise: OdometryNoise
     slip: LearnedSlip
+    answer: MotionSample
 
 
 class Taken(NamedTuple):

@@ -14,15 +14,13 @@ from estimation.consistency.noise_estimate import (
     scaled_noise,
 )
 from estimation.consistency.process_estimate import (
-    MEMBERS,
     LearnedProcess,
-    Member,
     learn,
     learned_noise,
     restarted,
+    unlearned,
 )
-from estimation.consistency.slip_estimate import learn_slip, with_slip
-from estimation.filters.filter import Filter
+from estimation.consistency.slip_estimate import learn_slip
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import (
     Measurement,
@@ -33,9 +31,16 @@ from estimation.models.measurement import (
     measure_world,
     seen_in_range,
 )
-from estimation.own_motion.interval_motion import motion_between
-from estimation.own_motion.odometry_check import POSE, TRACK, OdometrySample, source_of, with_sample
-from estimation.own_motion.odometry_history import MotionSample, delay_ns, remember, sample_at, sample_place
+from estimation.own_motion.odometry_check import POSE, TRACK, OdometrySample, with_sample
+from estimation.own_motion.odometry_history import (
+    MotionSample,
+    answer_again,
+    delay_ns,
+    remember,
+    sample_at,
+    sample_place,
+    time_constant_of,
+)
 from estimation.own_motion.own_track import folded, motion_of, own_place, own_point, own_predicted
 from estimation.tracking.estimate import estimate_at, guessed_when_slow
 from estimation.tracking.follower_check import BELIEVED, MOUNT
@@ -61,7 +66,7 @@ from estimation.tracking.tracker import (
 from estimation.tracking.travel_watch import watched
 from formation.kernel import kernel
 from formation.mount import robot_pose
-from formation.records import Rows, load, store
+from formation.records import Rows, store
 from formation.ring import place
 from hil.nodes.estimator_records import (
     AUTO,
@@ -76,6 +81,7 @@ from hil.nodes.estimator_records import (
     Told,
 )
 from hil.nodes.own_motion_step import (
+    answered_sample,
     by_either,
     by_either_at,
     by_odometry,
@@ -83,6 +89,9 @@ from hil.nodes.own_motion_step import (
     due_pose,
     finds_odometry_noise,
     own_again,
+    source_now,
+    way_known,
+    with_answer,
     with_judged_odometry,
     with_odometry_noise,
 )
@@ -124,27 +133,35 @@ def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen
         learned = noise_with_frame(known.noise, Moment(capture_ns, seen), gated, rules.noise_learning)
         after = after._replace(noise=learned)
         if is_another(learned):
-            after = _on_other_noise(after, memory, rules.filter)
+            after = _on_other_noise(after, memory, rules)
+        elif after.process.begun and not known.process.begun:
+            after = _on_this_noise(after)
     return taken._replace(known=after)
 
 
 @kernel
-def _on_other_noise(known: Known, memory: Memory, estimator: Filter) -> Known:
+def _on_other_noise(known: Known, memory: Memory, rules: Rules) -> Known:
     """The same where the noise turns out to be another one than all rests on that was learned before.
 
-    How the leader drives was weighed against that, and of a larger noise the belief is less certain.
+    How the leader drives was weighed against that, and of a larger noise the belief is less certain. A track
+    that has settled is not waited for again.
     """
     points, ring, noise = memory.points, known.track, known.noise
     if ring.length > 0 and noise.scale.position > noise.basis:
         by, point = noise.scale.position / noise.basis, newest(points, ring)
-        wider = estimator.widened(point.belief, by * by)
+        wider = rules.filter.widened(point.belief, by * by)
         # Innovations that leaned to one side were noise.
         point = point._replace(belief=wider, manoeuvre=steady())
         store(points, place(ring, points, ring.length - 1), point)
-    for k in range(MEMBERS):
-        store(memory.bank, k, load(Member, memory.bank, k)._replace(score=0.0))
-    noise = noise._replace(basis=noise.scale.position)
-    return known._replace(noise=noise, process=restarted(known.process)._replace(speed=1.0, turn=1.0))
+    process = unlearned(known.process, memory.bank, rules.process_learning)
+    return _on_this_noise(known._replace(process=process))
+
+
+@kernel
+def _on_this_noise(known: Known) -> Known:
+    """The same, all that is learned from now on resting on the noise as it is known now."""
+    noise = known.noise
+    return known._replace(noise=noise._replace(basis=noise.scale.position))
 
 
 @kernel
@@ -165,17 +182,18 @@ def with_noise(rules: Rules, noise: PoseNoise) -> Rules:
 
 @kernel
 def _take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
+    due = due_pose(known, memory, rules, capture_ns, seen)
     if rules.source == ODOMETRY:
         motion = by_odometry(known, memory, rules, capture_ns)
-        return take(known, memory, rules, measured(rules, capture_ns, seen, motion))
-    due = due_pose(known, memory, rules, capture_ns, seen)
-    if rules.source == AUTO:
+    elif rules.source == AUTO:
         motion = by_either(known, memory, rules, due)
     else:
         motion = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
         if known.own.length > 0 and capture_ns < own_point(memory.own, known.own, 0).capture_ns:
             motion = by_odometry(known, memory, rules, capture_ns)
     taken = take(known, memory, rules, measured(rules, capture_ns, seen, motion))
+    if rules.source == ODOMETRY:
+        return taken
     # A follower's pose that is not believed must not move its own track either.
     believed = taken.cause == BELIEVED or taken.cause == LEADER_OFF
     # Odometry that lies must not keep its judge from the poses that tell so: the track has a gate of its own.
@@ -207,29 +225,12 @@ def measured(rules: Rules, capture_ns: int, seen: PairSeen, motion: FollowerMoti
 
 
 @kernel
-def _with_way(known: Known, memory: Memory, rules: Rules, measurement: Measurement, k: int) -> Measurement:
-    """Measurement, the track's k-th, with the way by odometry since the one before, where that counts."""
-    if rules.filter.in_world or measurement.anchored or k == 0 or known.odometry.length == 0:
-        return measurement
-    to_ns = measurement.capture_ns
-    if measurement.framed and rules.source != ODOMETRY:
-        return measurement._replace(has_way=False)
-    from_ns = capture_at(memory.points, known.track, k - 1)
-    if from_ns >= to_ns:
-        return measurement
-    way = motion_between(memory.history, known.odometry, (from_ns, to_ns), rules.trust, known.correction)
-    if rules.learns_slip:
-        way = with_slip(way, known.slip)
-    return measurement._replace(has_way=True, way=way)
-
-
-@kernel
 def take(known: Known, memory: Memory, rules: Rules, measurement: Measurement) -> Taken:
     """Take in a measurement of the leader."""
     points, ring = memory.points, known.track
     late = ring.length > 0 and measurement.capture_ns < capture_at(points, ring, ring.length - 1)
     before = place_of(points, ring, measurement.capture_ns)
-    measurement = _with_way(known, memory, rules, measurement, before)
+    measurement = way_known(known, memory, rules, measurement, before)
     learning, estimator = rules.process_learning, rules.filter
     if learning.on:
         estimator = estimator.driven_by(learned_noise(known.process, learning))
@@ -255,7 +256,7 @@ def _shorten_way(known: Known, memory: Memory, rules: Rules, capture_ns: int) ->
     """Give what comes after a measurement that came late its way since that one."""
     points, ring = memory.points, known.track
     k = place_of(points, ring, capture_ns) + 1
-    after = _with_way(known, memory, rules, point_at(points, ring, k).measurement, k)
+    after = way_known(known, memory, rules, point_at(points, ring, k).measurement, k)
     if _put_measurement(known, memory, k, after):
         reprocessed(points, ring, k, rules.settings, rules.filter)
 
@@ -280,8 +281,9 @@ def _learned(known: Known, memory: Memory, rules: Rules, verdict: int) -> Learne
 @kernel
 def _with_checked(known: Known, memory: Memory, rules: Rules, told: OdometrySample) -> Known:
     """Known with a sample of odometry in its check, and in what is found of its noise."""
-    check, by = known.odometry_check, known.correction
-    told = told._replace(v2=by.scale_v * told.v2, u2=by.scale_u * told.u2)
+    check = known.odometry_check
+    known = with_answer(known, rules, told)
+    told = answered_sample(known, rules, told)
     if check.heard and finds_odometry_noise(rules):
         known = with_odometry_noise(known, check.last, told, rules)
     known = known._replace(odometry_check=with_sample(check, memory.ways, told, rules.own_noise))
@@ -295,16 +297,19 @@ def _with_checked(known: Known, memory: Memory, rules: Rules, told: OdometrySamp
 @kernel
 def take_odometry(known: Known, memory: Memory, rules: Rules, told: OdometrySample) -> Known:
     """Take in a sample of odometry, and fold again what came after the sample before it."""
-    sample = MotionSample(told.stamp_ns, told.v2, told.u2)
+    sample = MotionSample(told.stamp_ns, told.v2, told.u2, 0.0, 0.0)
     if rules.source == AUTO:
         check = known.odometry_check
-        if source_of(check) == POSE and told.has_pose and check.last.has_pose:
+        if source_now(known, rules) == POSE and told.has_pose and check.last.has_pose:
             sample = by_pose(check.last, told)
         known = _with_checked(known, memory, rules, told)
     ring = remember(memory.history, known.odometry, sample, rules.span)
+    time_constant = time_constant_of(rules.trust, known.correction)
+    if time_constant > 0.0:
+        answer_again(memory.history, ring, sample.stamp_ns, time_constant)
     known = known._replace(odometry=ring)
     n = known.track.length
-    if not rules.reprocesses or n == 0 or source_of(known.odometry_check) == TRACK:
+    if not rules.reprocesses or n == 0 or source_now(known, rules) == TRACK:
         return known
     k, since_ns = sample_place(memory.history, ring, sample.stamp_ns), 0
     if k > 0:
@@ -335,7 +340,7 @@ def _with_odometry(known: Known, memory: Memory, rules: Rules, first: int) -> bo
         else:
             motion = by_odometry(known, memory, rules, capture_ns)
         measurement = with_motion(point, motion).measurement
-        measurement = _with_way(known, memory, rules, measurement, k)
+        measurement = way_known(known, memory, rules, measurement, k)
         changed = _put_measurement(known, memory, k, measurement) or changed
     return changed
 

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 from estimation.consistency.slip_estimate import with_slip
 from estimation.models.coordinated_turn import FollowerMotion
-from estimation.models.measurement import PairSeen
+from estimation.models.measurement import Measurement, PairSeen
+from estimation.own_motion.interval_motion import motion_between
 from estimation.own_motion.judged_odometry import age_of, aged, fresh_for, is_better, with_own_track
 from estimation.own_motion.odometry_check import (
+    POSE,
     TRACK,
     OdometrySample,
     awaits_track,
     source_of,
     way_between,
 )
-from estimation.own_motion.odometry_history import InputTrust, MotionSample, follower_motion
+from estimation.own_motion.odometry_history import (
+    InputTrust,
+    MotionSample,
+    answered,
+    follower_motion,
+    scaled_motion,
+    time_constant_of,
+)
 from estimation.own_motion.odometry_noise import noise_with_sample, noise_with_window, with_found_noise
 from estimation.own_motion.own_track import (
     OwnPoint,
@@ -25,10 +34,11 @@ from estimation.own_motion.own_track import (
     own_predicted,
     own_reprocessed,
 )
+from estimation.tracking.tracker import capture_at
 from formation.kernel import kernel
 from formation.records import store
 from formation.ring import place
-from hil.nodes.estimator_records import AUTO, FUSED, MOCAP, Known, Memory, Rules
+from hil.nodes.estimator_records import AUTO, FUSED, MOCAP, ODOMETRY, Known, Memory, Rules
 
 _NS = 1e-9
 
@@ -38,6 +48,23 @@ def by_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> 
     """Motion of the follower as odometry tells it, put right where that is known to be wrong."""
     motion = follower_motion(memory.history, known.odometry, capture_ns, rules.trust, known.correction)
     return with_slip(motion, known.slip) if rules.learns_slip else motion
+
+
+@kernel
+def way_known(known: Known, memory: Memory, rules: Rules, measurement: Measurement, k: int) -> Measurement:
+    """Measurement, the track's k-th, with the way by odometry since the one before, where that counts."""
+    if rules.filter.in_world or measurement.anchored or k == 0 or known.odometry.length == 0:
+        return measurement
+    to_ns = measurement.capture_ns
+    if measurement.framed and rules.source != ODOMETRY:
+        return measurement._replace(has_way=False)
+    from_ns = capture_at(memory.points, known.track, k - 1)
+    if from_ns >= to_ns:
+        return measurement
+    way = motion_between(memory.history, known.odometry, (from_ns, to_ns), rules.trust, known.correction)
+    if rules.learns_slip:
+        way = with_slip(way, known.slip)
+    return measurement._replace(has_way=True, way=way)
 
 
 @kernel
@@ -55,9 +82,42 @@ def by_pose(before: OdometrySample, after: OdometrySample) -> MotionSample:
     """Mean motion from one pose of odometry to the next, in the middle between them."""
     span_ns = after.stamp_ns - before.stamp_ns
     if span_ns <= 0:
-        return MotionSample(after.stamp_ns, after.v2, after.u2)
+        return MotionSample(after.stamp_ns, after.v2, after.u2, 0.0, 0.0)
     way, dt = way_between(before.pose, after.pose), span_ns * _NS
-    return MotionSample(before.stamp_ns + span_ns // 2, way.v / dt, way.u / dt)
+    return MotionSample(before.stamp_ns + span_ns // 2, way.v / dt, way.u / dt, 0.0, 0.0)
+
+
+@kernel
+def source_now(known: Known, rules: Rules) -> int:
+    """What the follower's motion is taken from.
+
+    Where the motion is a lag's answer to the signal, odometry's pose cannot stand in for it: wheels that add
+    up their turns have no such lag.
+    """
+    source = source_of(known.odometry_check)
+    return TRACK if source == POSE and time_constant_of(rules.trust, known.correction) > 0.0 else source
+
+
+@kernel
+def with_answer(known: Known, rules: Rules, told: OdometrySample) -> Known:
+    """Known with the lag's answer to the newest sample, if there is a lag."""
+    time_constant, last = time_constant_of(rules.trust, known.correction), known.answer
+    if time_constant <= 0.0 or told.stamp_ns <= last.stamp_ns:
+        return known
+    now = MotionSample(told.stamp_ns, told.v2, told.u2, told.v2, told.u2)
+    if last.stamp_ns > 0:
+        now = answered(last, now, told.stamp_ns, time_constant)
+    return known._replace(answer=now)
+
+
+@kernel
+def answered_sample(known: Known, rules: Rules, told: OdometrySample) -> OdometrySample:
+    """The newest sample as the motion that it stands for: what the lag makes of it, scaled."""
+    now = MotionSample(told.stamp_ns, told.v2, told.u2, 0.0, 0.0)
+    if known.answer.stamp_ns == told.stamp_ns and time_constant_of(rules.trust, known.correction) > 0.0:
+        now = now._replace(v2=known.answer.answer_v, u2=known.answer.answer_u)
+    now = scaled_motion(now, rules.trust, known.correction)
+    return told._replace(v2=now.v2, u2=now.u2)
 
 
 @kernel
@@ -71,7 +131,7 @@ def _fresh_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int)
     """Motion by odometry that is believed, as old as it is; by nothing at all if there is none to believe."""
     motion, check = by_odometry(known, memory, rules, capture_ns), known.odometry_check
     motion = with_found_noise(motion, known.odometry_noise)
-    if source_of(check) == TRACK or not check.heard:
+    if source_now(known, rules) == TRACK or not check.heard:
         return motion._replace(sd_v2=rules.own_noise.v_max, sd_u2=rules.own_noise.u_max)
     return aged(motion, check, age_of(check, capture_ns, _trust(known, rules)), rules.own_noise)
 
@@ -81,7 +141,7 @@ def is_fresh(known: Known, rules: Rules, capture_ns: int) -> bool:
     """Whether odometry is believed and covers a capture."""
     check = known.odometry_check
     age = age_of(check, capture_ns, _trust(known, rules))
-    return check.heard and source_of(check) != TRACK and age <= fresh_for(check)
+    return check.heard and source_now(known, rules) != TRACK and age <= fresh_for(check)
 
 
 @kernel

@@ -169,5 +169,8 @@ def input_trust(scenario: Scenario) -> InputTrust:
         limits.u_max,
         given.slip_v2 if given.front_end == "body" else 0.0,
         given.slip_u2 if given.front_end == "body" else 0.0,
+        given.input_time_constant_s,
+        given.input_scale_v,
+        given.input_scale_u,
     )
     return InputTrust(*map(float, numbers))

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from formation.pose import Motion
 from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2, Shape
 from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
-from formation.steering_margin import SteeringMargin, steering_margin
+from formation.steering_margin import SteeringMargin, settles, settles_in_proof, steering_margin
 from tests.formation.shape_rates import reduced_rates
 
 MU1, SPACING, V1 = 1.5, Spacing(0.2, 20.0), 0.08
@@ -41,13 +42,23 @@ def motion(program: LeaderProgram, start: tuple[float, float], times: np.ndarray
 
 
 def test_the_bracket_of_the_robot_experiment(margin: SteeringMargin) -> None:
-    assert 0.80 <= margin.lower < margin.upper <= 1.48
-    assert margin.lower > 0.7, "the experiment's own steering must be covered"
+    assert 1.15 < margin.lower < margin.upper <= 1.48
+    assert margin.proved
 
 
-def test_below_the_bracket_a_constant_metric_shrinks_all_distances(margin: SteeringMargin) -> None:
-    """The matrices of the proof themselves, over the whole set; a little above none such is found."""
-    system = Disturbed(MU1, SPACING, SpeedRange(V1, V1), 0.999 * margin.lower)
+@pytest.mark.slow
+def test_where_no_metric_is_proved_the_constant_one_stays_and_is_not_called_proved() -> None:
+    """A damping so strong that the set all but degenerates: nothing is found there."""
+    found = steering_margin(30.0, SPACING, V1)
+    assert not found.proved
+    assert settles(Disturbed(30.0, SPACING, SpeedRange(V1, V1), found.lower))
+
+
+def test_below_its_own_edge_a_constant_metric_shrinks_all_distances() -> None:
+    """The matrices of the quick test themselves, over the whole set."""
+    system = Disturbed(MU1, SPACING, SpeedRange(V1, V1), 1.0085)
+    assert settles(system)
+    assert not settles(replace(system, D=1.01))
     inside = invariant_set(system)
     assert inside is not None
     random = np.random.default_rng(5)
@@ -96,6 +107,13 @@ def test_above_the_bracket_a_swing_loses_the_formation(margin: SteeringMargin) -
         end = motion(swinging(share * margin.upper), (SPACING.rho_0, ABREAST_ALPHA1), times)
         swing = np.abs(end[:, 1] - ABREAST_ALPHA1).max()
         assert bool(swing > math.pi) is lost, share
+
+
+def test_what_is_proved_is_proved_below_too(margin: SteeringMargin) -> None:
+    assert settles_in_proof(MU1, SPACING, V1, margin.lower)
+    assert settles_in_proof(MU1, SPACING, V1, 0.7)
+    assert not settles_in_proof(MU1, SPACING, V1, 1.199), "the set is kept there, but no metric is found"
+    assert not settles_in_proof(MU1, SPACING, V1, 1.21)
 
 
 def test_more_gain_never_narrows_the_proof() -> None:

@@ -14,13 +14,22 @@ from estimation.consistency.process_estimate import (
     MEMBERS,
     NOTHING_LEARNED,
     SHARE,
+    SPEED_LOWEST,
+    SPEED_MEMBERS,
+    SPEED_RATIO,
+    TURN_LOWEST,
+    TURN_MEMBERS,
+    TURN_RATIO,
     LearnedProcess,
     Member,
     ProcessLearning,
+    _posterior,
+    _taken,
     _vertex,
     learn,
     learned_noise,
     restarted,
+    unlearned,
 )
 from estimation.filters.belief import Model
 from estimation.filters.filter import Filter, Kind, filter_of
@@ -30,7 +39,7 @@ from estimation.models.measurement import FrontEnd, Measurement, PoseNoise, meas
 from estimation.models.motion import Vector
 from estimation.tracking.track_point import TrackPoint, begun
 from formation.pose import Pose
-from formation.records import Rows, load, rows_of
+from formation.records import Rows, load, rows_of, store
 
 LIMITS = LeaderLimits(v_eps=0.04, k_v=0.1, k_u=0.7)
 SD, STEP = 1e-3, 1.0 / 30.0
@@ -116,6 +125,32 @@ def test_a_new_track_starts_the_bank_anew_and_keeps_what_was_learned() -> None:
         k += 1
     assert [load(Member, bank, k).score for k in range(MEMBERS)] == scores
     assert load(Member, bank, 3).belief.x == pytest.approx(5.0, abs=0.1)
+
+
+@pytest.mark.parametrize("k", range(TURN_MEMBERS, MEMBERS))
+def test_a_little_evidence_for_one_member_does_not_take_the_noise_there(k: int) -> None:
+    """Where nothing tells members apart it is near what is told, and a nat for one of them changes little."""
+    bank = rows_of(Member, MEMBERS)
+    none = _taken(bank, 0.01, 0.0, 0.0, False)
+    store(bank, k, load(Member, bank, k)._replace(score=1.0))
+    one = _taken(bank, 0.01, 0.0, 0.0, False)
+    assert abs(math.log(none)) < math.log(5.0)
+    assert abs(math.log(one / none)) < math.log(8.0)
+
+
+def test_with_another_noise_what_was_found_takes_the_place_of_what_is_told() -> None:
+    rules = learning(0.5, 0.01)
+    learned, bank = found_for(0.05, 0.001, rules)
+    again = unlearned(learned, bank, rules)
+    assert (again.speed, again.turn, again.begun) == (learned.speed, learned.turn, False)
+    assert again.settled_ns == learned.settled_ns
+    turns = [math.log(TURN_LOWEST * TURN_RATIO**k / 0.5) for k in range(TURN_MEMBERS)]
+    speeds = [math.log(SPEED_LOWEST * SPEED_RATIO**k / 0.01) for k in range(SPEED_MEMBERS)]
+    for first, offs, found in ((0, turns, learned.turn), (TURN_MEMBERS, speeds, learned.speed)):
+        likely = [_posterior(bank, first + k, off) for k, off in enumerate(offs)]
+        apart = [abs(off - math.log(found)) for off in offs]
+        assert np.argsort(likely)[::-1].tolist() == np.argsort(apart).tolist()
+        assert max(likely) - min(likely) < 5.0
 
 
 @given(st.floats(0.5, 2.5), st.floats(-0.45, 0.45), st.floats(0.1, 1e3))

@@ -10,12 +10,13 @@ from estimation.own_motion import odometry_correction
 from estimation.own_motion.input_alignment import UNKNOWN, Alignment, Known
 from estimation.own_motion.odometry_correction import (
     NOTHING_SEEN,
+    PERFECT,
     OdometryComparison,
     reconsidered,
     with_pose,
     with_sample,
 )
-from estimation.own_motion.odometry_history import IDEAL, Correction, MotionSample
+from estimation.own_motion.odometry_history import AS_TOLD, IDEAL, Correction, InputTrust, MotionSample
 from formation.pose import Pose
 
 MS = 1_000_000
@@ -148,6 +149,50 @@ def test_one_that_has_begun_follows_until_odometry_is_within_half_of_that(
         found = Known(off, 1.0), Known(1.0 + off, 1.0), Known(1.0 + off, 1.0)
         expected = Correction(off, 1.0 + off, 1.0 + off) if lasts else IDEAL
         assert corrected(monkeypatch, *found, before=before) == expected
+
+
+def answering(
+    monkeypatch: pytest.MonkeyPatch,
+    delay: Known,
+    lag: Known | None,
+    given: InputTrust = PERFECT,
+    before: Correction = IDEAL,
+) -> Correction:
+    """What is applied after an alignment with a lag, given what odometry is trusted with."""
+    late = Known(delay.value + (lag.value if lag else 0.0), 0.01)
+    monkeypatch.setattr(
+        odometry_correction, "align_odometry", Aligned(Alignment(delay, None, None, lag, late))
+    )
+    return reconsidered(seen(before), ZERO_NS, given).applied
+
+
+def test_a_lag_is_applied_where_it_is_sure_and_else_its_time_is_one_of_delay(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sure = answering(monkeypatch, Known(0.08, 0.01), Known(0.15, 0.02))
+    assert sure.delay == pytest.approx(0.08)
+    assert sure.time_constant == pytest.approx(0.15)
+    assert sure.left == pytest.approx(0.03)
+    unsure = answering(monkeypatch, Known(0.08, 0.01), Known(0.15, 0.04))
+    assert unsure.delay == pytest.approx(0.23)
+    assert unsure.time_constant == AS_TOLD
+    # What was told of the lag is what a delay comes on top of.
+    told = InputTrust(0.01, 0.1, time_constant=0.15, lag=0.3)
+    kept = answering(monkeypatch, Known(0.23, 0.01), None, told)
+    assert kept.delay == pytest.approx(0.08)
+    assert kept.time_constant == AS_TOLD
+    same = answering(monkeypatch, Known(0.08, 0.01), Known(0.16, 0.02), told)
+    assert same.delay == pytest.approx(0.09)
+    assert same.time_constant == AS_TOLD
+
+
+def test_what_is_told_of_odometry_is_taken_off_before_it_is_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    align = Aligned(UNKNOWN)
+    monkeypatch.setattr(odometry_correction, "align_odometry", align)
+    reconsidered(seen(), ZERO_NS, InputTrust(0.01, 0.1, delay=0.2, scale_v=2.0, scale_u=0.5))
+    ((_, _, odometry_times, odometry),) = align.asked
+    assert odometry_times == pytest.approx([-0.3, 0.21])
+    assert np.allclose(odometry, [[0.2, 0.1], [0.6, 0.2]])
 
 
 def test_what_is_no_longer_known_stays(monkeypatch: pytest.MonkeyPatch) -> None:

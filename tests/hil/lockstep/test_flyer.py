@@ -43,6 +43,11 @@ OTHER_ROBOT += ["robot.lag_s=0", "controller.tick_hz=200", "mocap.rate_hz=97", "
 LATE = ["mocap.jitter_s=0.03", "robot.odometry_delay_s=0.04", "robot.odometry_scale_v=1.02"]
 AUTO = ["estimator.own_motion=auto"]
 BODY = ["estimator.front_end=body"]
+ANSWERS = [
+    "estimator.input_time_constant_s=0.1",
+    "estimator.input_lag_s=0.02",
+    "estimator.input_scale_v=0.97",
+]
 FAULTS = [
     'mocap.faults=[{kind="swap", at_s=0.8}, {kind="turn", body="follower", at_s=1.0, duration_s=0.1, '
     'angle=3.14}, {kind="freeze", body="leader", at_s=1.3, duration_s=0.2}, {kind="dropout", at_s=1.7, '
@@ -94,6 +99,8 @@ CASES = [
     ("turtlebot3", [*AUTO, lying("silent"), "run.duration_s=1.5"]),
     ("turtlebot3", [*AUTO, lying("nan"), "run.duration_s=1.5"]),
     ("turtlebot3", [*AUTO, lying("zero")]),
+    ("turtlebot3", [*AUTO, *ANSWERS, lying("commands")]),
+    ("turtlebot3", [*BODY, *ANSWERS, lying("commands"), "estimator.own_motion=odometry"]),
     ("turtlebot3", [*AUTO, lying("delay", delay_s=0.05), "run.duration_s=1.5"]),
     ("chain5-turtlebot3", [*AUTO, lying("reversed"), "mocap.loss=0.1"]),
     ("turtlebot3", ["estimator.own_motion=odometry", lying("reset"), lying("slip")]),
