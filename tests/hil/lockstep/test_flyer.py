@@ -190,7 +190,13 @@ def test_rings_have_a_power_of_two_of_rows(rate: float) -> None:
     scenario = scenario_of("turtlebot3", told)
     rooms, desk = Flyer(scenario).rooms, EstimatorNode(scenario).rows_only(0).memory.desk
     rings = [rooms.points, rooms.history, rooms.own, rooms.ways, rooms.sent, rooms.lab.underway]
-    rings += [desk.points, desk.history, desk.own, desk.ways, ControllerNode(scenario).rows_only(0).desk.commands]
+    rings += [
+        desk.points,
+        desk.history,
+        desk.own,
+        desk.ways,
+        ControllerNode(scenario).rows_only(0).desk.commands,
+    ]
     for rows in rings:
         assert len(rows).bit_count() == 1
 
