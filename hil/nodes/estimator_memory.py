@@ -288,6 +288,12 @@ class EstimatorMemory:
         return tuple(_held(MotionSample, self.desk.history, self.known.odometry))
 
     @property
+    def ways(self) -> tuple[WayEntry, ...]:
+        """Ways of odometry and the follower's own track, oldest first, where both are known."""
+        check = self.known.odometry_check
+        return tuple(_held(WayEntry, self.desk.ways, check.entries)[: check.paired])
+
+    @property
     def receipts(self) -> tuple[Receipt, ...]:
         """Receipts of the inputs since the last estimate."""
         return tuple(load(Receipt, self.desk.receipts, k) for k in range(self.notes.receipts))
