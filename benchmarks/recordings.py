@@ -2,6 +2,8 @@
 
     ABREAST_REAL=DIR python benchmarks/recordings.py [--only camera] [--set KEY=VALUE] [--answered] [--each]
 
+The LiDAR has a row as it is, and one with the offsets that ``abreast calibrate`` finds in its first 6.6 s.
+
 One line for each way of measuring, medians over pairs: RMSE of v1 while tracking, that over the RMSE of the
 best constant guess (over the same samples, and over all that is known of the leader), median error of alpha1,
 correlation of v1 with the truth, share of the measurements of a moving leader at which it is tracked, share
@@ -27,7 +29,10 @@ from hil.judge.estimation import errors_at
 from hil.judge.replay_verdict import run_data_of_replay
 from hil.log.metadata import scenario_of
 from hil.log.reader import read_log
+from hil.recordings.column_map import load_column_map
+from hil.recordings.csv_import import import_csv
 from hil.recordings.mrclam_import import Sightings, import_mrclam
+from hil.replay.calibration import calibrate
 from hil.replay.rerun import replay
 from hil.replay.timing import timing_of
 from hil.scenario.files import with_overrides
@@ -42,8 +47,10 @@ WAYS: tuple[tuple[str, Sightings, tuple[str, ...]], ...] = (
     ("world", "vicon", ()),
     ("body, odometry", "vicon", ("front_end='body'", "own_motion='odometry'")),
     ("body, mocap motion", "vicon", ("front_end='body'", "own_motion='mocap'")),
+    ("body, auto", "vicon", ("front_end='body'", "own_motion='auto'")),
     ("camera", "camera", ()),
 )
+LIDAR, CALIBRATED_TO = "turtlebot3_lidar_optitrack", 6.6
 FIGURES = ("v1", "/const", "/guess", "alpha1", "corr", "tracked", ">5sd", "nees v1", "nees alpha1", "nis")
 
 
@@ -114,6 +121,20 @@ def main() -> None:
                 if given.each:
                     _print(f"  {leader} seen by {follower}", rows[-1])
             _print(name, np.nanmedian(np.array(rows), axis=0).tolist())
+        if given.only in "lidar":
+            log = Path(folder) / "lidar.mcap"
+            import_csv(real / f"{LIDAR}.csv", load_column_map(LIDAR), log)
+            _print("lidar", figures_of(log, given.set))
+            _print("lidar, calibrated", figures_of(log, [*_offsets(log), *given.set]))
+
+
+def _offsets(log: Path) -> list[str]:
+    """Keys of the estimator by which a sensor is put right, from the first seconds of its log."""
+    opened = read_log(log)
+    scenario = scenario_of(opened)
+    assert scenario is not None
+    found = calibrate(opened, scenario, None, CALIBRATED_TO)
+    return [f"range_bias={found.range.value}", f"bearing_bias={found.bearing.value}"]
 
 
 def _print(name: str, row: Sequence[float]) -> None:

@@ -165,6 +165,22 @@ def part(kind: type[R], rows: Rows[R], first: int, count: int) -> Rows[R]:
     return cast("Rows[R]", columns_of(rows)[first : first + count])
 
 
+def within(kind: type[R], rows: Rows[R], k: int, name: str) -> Rows[Any]:
+    """One row of what a field of the k-th row holds, a named tuple; changing it changes that.
+
+    What a step changes of a large record is stored so, and the rest of it stays where it is.
+
+    >>> class Pair(NamedTuple):
+    ...     first: Span
+    ...     second: Span
+    >>> pairs = rows_of(Pair, 1)
+    >>> store(within(Pair, pairs, 0, "second"), 0, Span(3, 4))
+    >>> load(Pair, pairs, 0)
+    Pair(first=Span(address=0, length=0), second=Span(address=3, length=4))
+    """
+    return cast("Rows[Any]", columns_of(rows)[k : k + 1][name])
+
+
 class _ListPart:
     """Part of a list that stands for rows."""
 

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.station_keeper import at_station
-from estimation.consistency.process_estimate import MEMBERS, Member
+from estimation.consistency.process_estimate import Member
+from estimation.consistency.slip_estimate import BANK
 from estimation.filters.filter import Filter
 from estimation.own_motion.odometry_check import WayEntry
 from estimation.own_motion.odometry_history import MotionSample
@@ -208,7 +209,7 @@ class Flyer:
             rows_of(MotionSample, n * share.history),
             rows_of(OwnPoint, n * share.own),
             rows_of(WayEntry, n * share.ways),
-            rows_of(Member, n * MEMBERS),
+            rows_of(Member, n * BANK),
             rows_of(SentCommand, n * share.sent),
             self._orders,
             rows_of(KeptEstimate, n * (self._in_flight + 1)),
