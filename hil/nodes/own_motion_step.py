@@ -164,8 +164,12 @@ def _either(motion: FollowerMotion, fresh: bool, own: OwnPoint, rules: Rules) ->
 def by_either(known: Known, memory: Memory, rules: Rules, due: OwnPoint) -> FollowerMotion:
     """Motion at a pose that is due: by odometry, or by the follower's own track."""
     motion = _fresh_odometry(known, memory, rules, due.capture_ns)
-    own = own_predicted(memory.own, known.own, due, rules.own_noise)
-    return _either(motion, is_fresh(known, rules, due.capture_ns), own, rules)
+    fresh = is_fresh(known, rules, due.capture_ns)
+    ring = known.own
+    # What the newest point has nothing against need not cost a step of the track's filter.
+    if fresh and (ring.length == 0 or not contradicts(motion, own_point(memory.own, ring, ring.length - 1))):
+        return motion
+    return _either(motion, fresh, own_predicted(memory.own, ring, due, rules.own_noise), rules)
 
 
 @kernel

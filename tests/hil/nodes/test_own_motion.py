@@ -168,10 +168,11 @@ def test_odometry_that_lies_is_named_and_the_track_takes_over(front_end: str) ->
     node = node_with("auto", front_end)
     state, found = fed(node, driven_round(480, WRONG))
     assert set(findings(node, state, 480)) == {"finding.odometry_contradicts"}
-    # Before it is refuted the track speaks against it already.
+    # Before it is refuted the track speaks against it already; less clearly where wheels may slip.
+    slack = 1.0 if front_end == "world" else 2.0
     assert source_of(lied_to(node, 120).memory.known.odometry_check) == TWIST
-    assert np.mean([e.v2 for e in found[60:120]]) == pytest.approx(OWN.v, abs=0.03)
-    assert np.mean([e.u2 for e in found[60:120]]) == pytest.approx(OWN.u, abs=0.15)
+    assert np.mean([e.v2 for e in found[60:120]]) == pytest.approx(OWN.v, abs=0.03 * slack)
+    assert np.mean([e.u2 for e in found[60:120]]) == pytest.approx(OWN.u, abs=0.15 * slack)
     assert np.mean([e.v2 for e in found[300:]]) == pytest.approx(OWN.v, abs=0.01)
     assert np.mean([e.u2 for e in found[300:]]) == pytest.approx(OWN.u, abs=0.05)
 
