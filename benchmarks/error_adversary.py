@@ -2,11 +2,11 @@
 
     python benchmarks/error_adversary.py [--pairs 10000] [--robots 1000] [--duration 30] [--seed 1]
 
-First the set on the manifold alpha2 = pi/2, then the joint set of rho, alpha1 and alpha2, for an error that is
-one percent below the largest for which it closes: pairs begin anywhere in it, alpha2 off by up to its radius. The
-first line of each is the model that the proof is about. Then robots: motors lag, commands are truncated, alone
-and together, without limits of speed and within the robots'. How far these get out of the set is what the
-proofs leave out; ``lost``: passed each other or drifted apart.
+First the set on the manifold alpha2 = pi/2, then the joint set of rho, alpha1 and alpha2, for an error one
+percent below the largest for which it closes: pairs begin anywhere in it, alpha2 off by up to its radius.
+The first line of each is the model that the proof is about. Then robots: motors lag, commands are truncated,
+alone and together, without limits of speed and within the robots'. How far these get out of the set is what
+the proofs leave out; ``lost``: passed each other or drifted apart.
 """
 
 from __future__ import annotations
