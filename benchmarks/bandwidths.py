@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from benchmarks.random_leaders import random_leader
-from estimation.consistency.process_estimate import MEMBERS, Member
+from estimation.consistency.filter_bank import BANK, Member
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import Measurement, PoseNoise, measure_body, measure_world
 from estimation.own_motion.odometry_check import WayEntry
@@ -237,7 +237,7 @@ def scored(rules: Rules, seen: Rows[Measurement], path: Driven, since: float) ->
         rows_of(MotionSample, 2),
         rows_of(OwnPoint, 2),
         rows_of(WayEntry, 2),
-        rows_of(Member, MEMBERS),
+        rows_of(Member, BANK),
         seen,
         estimates,
     )

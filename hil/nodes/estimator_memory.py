@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.consistency.process_estimate import MEMBERS, Member
+from estimation.consistency.filter_bank import BANK, Member
 from estimation.filters.filter import Filter
 from estimation.own_motion.odometry_check import OdometrySample, WayEntry
 from estimation.own_motion.odometry_history import (
@@ -152,7 +152,7 @@ class EstimatorMemory:
             history=rows_of(MotionSample, room_for(rules.step.span)),
             own=rows_of(OwnPoint, room),
             ways=rows_of(WayEntry, WAYS),
-            bank=rows_of(Member, MEMBERS),
+            bank=rows_of(Member, BANK),
             known=row_of(NOTHING_KNOWN),
             time=time_rows(),
             notes=row_of(NOTHING_NOTED),

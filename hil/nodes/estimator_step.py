@@ -11,11 +11,7 @@ from estimation.consistency.noise_estimate import (
     Moment,
     scaled_noise,
 )
-from estimation.consistency.process_estimate import (
-    learn,
-    learned_noise,
-    restarted,
-)
+from estimation.consistency.process_estimate import learn, learned_noise, restarted
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import (
     Measurement,
