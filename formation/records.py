@@ -182,10 +182,10 @@ def within(kind: type[R], rows: Rows[R], k: int, name: str) -> Rows[Any]:
 
 
 def load_across(kind: type[R], rows: Rows[R], count: int, k: int) -> R:
-    """The k-th of ``count`` records, a constant, that fill the rows field by field.
+    """The k-th of ``count`` records, a constant, that fill as many rows, the first ones, field by field.
 
     Each field of all of them lies side by side, so that compiled code works on several at once. All fields
-    are floats. Rows that are filled so are not for :func:`load` and :func:`store`.
+    are floats. These rows are not for :func:`load` and :func:`store`.
 
     >>> class Point(NamedTuple):
     ...     x: float
@@ -208,8 +208,8 @@ def store_across(rows: Rows[R], count: int, k: int, record: R) -> None:
 
 
 def _fields_of_all(rows: Rows[Any], count: int) -> NDArray[np.float64]:
-    """Fields (n, count) of records that lie field by field."""
-    return columns_of(rows).view(np.float64).reshape(-1, count)
+    """Fields (n, count) of records that lie field by field in the first rows."""
+    return columns_of(rows)[:count].view(np.float64).reshape(-1, count)
 
 
 class _ListPart:

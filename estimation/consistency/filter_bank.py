@@ -25,8 +25,8 @@ SPEED_MEMBERS, SPEED_RATIO, SPEED_LOWEST = 8, 8.0, 8.0**-7
 
 MEMBERS = TURN_MEMBERS + SPEED_MEMBERS
 
-BANK = 16
-"""Rows that the members of a bank take, field by field: a multiple of what a processor works on at once."""
+LANES = 16
+"""Rows that they take, field by field: a multiple of what a processor works on at once."""
 
 _LARGEST_NIS = 400.0  # a member further off starts again from the main filter
 
@@ -65,28 +65,28 @@ def score_all(
     """Move all members on to a measurement, score them by that, and let them take it in."""
     together = estimator.in_world and is_centred(estimator.lever)
     for k in range(MEMBERS):
-        together = together and is_small_swing(load_across(Member, bank, BANK, k).belief.u, trial.dt)
+        together = together and is_small_swing(load_across(Member, bank, LANES, k).belief.u, trial.dt)
     if together:
         # Without a branch, so that compiled code works on several members at once.
-        for k in range(BANK):
-            member = load_across(Member, bank, BANK, k)
+        for k in range(LANES):
+            member = load_across(Member, bank, LANES, k)
             noise = trial.noise._replace(q_v=member.q_v, q_u=member.q_u)
             t = small_swing(member.belief.u, trial.dt)
             prior = swung_on(member.belief, t, trial.dt, noise)
-            store_across(bank, BANK, k, _informed(member, prior, trial))
+            store_across(bank, LANES, k, _informed(member, prior, trial))
     else:
         for k in range(MEMBERS):
-            member = load_across(Member, bank, BANK, k)
+            member = load_across(Member, bank, LANES, k)
             noise = trial.noise._replace(q_v=member.q_v, q_u=member.q_u)
             one = estimator._replace(kind=EKF, noise=noise)
             prior = one.predict(member.belief, trial.dt, motion)
-            store_across(bank, BANK, k, _informed(member, prior, trial))
+            store_across(bank, LANES, k, _informed(member, prior, trial))
     for k in range(MEMBERS):
-        member = load_across(Member, bank, BANK, k)
+        member = load_across(Member, bank, LANES, k)
         score = trial.kept * member.score - 0.5 * (min(member.nis, _LARGEST_NIS) + math.log(member.det))
-        store_across(bank, BANK, k, member._replace(score=score))
+        store_across(bank, LANES, k, member._replace(score=score))
         if not member.nis <= _LARGEST_NIS:
-            store_across(bank, BANK, k, member._replace(score=score, belief=belief))
+            store_across(bank, LANES, k, member._replace(score=score, belief=belief))
 
 
 @kernel

@@ -15,7 +15,7 @@ import math
 from typing import NamedTuple
 
 from estimation.consistency.filter_bank import (
-    BANK,
+    LANES,
     MEMBERS,
     SPEED_LOWEST,
     SPEED_MEMBERS,
@@ -171,7 +171,7 @@ def _score_as_found(bank: Rows[Member], found: float, told: float, turn: bool) -
         first, count, tried, ratio = 0, TURN_MEMBERS, TURN_LOWEST, TURN_RATIO
     for k in range(first, first + count):
         score = _prior(math.log(tried / found)) - _prior(math.log(tried / told))
-        store_across(bank, BANK, k, load_across(Member, bank, BANK, k)._replace(score=score))
+        store_across(bank, LANES, k, load_across(Member, bank, LANES, k)._replace(score=score))
         tried = tried * ratio
 
 
@@ -203,15 +203,15 @@ def _waiting(
 def _begin(bank: Rows[Member], belief: Gaussian, rules: ProcessLearning) -> None:
     """Start all members from a belief."""
     turn, speed = _range_of(rules, True), _range_of(rules, False)
-    for k in range(BANK):
+    for k in range(LANES):
         prior = 0.0
         if k < TURN_MEMBERS:
             prior = _prior(turn.lowest + turn.step * k)
         elif k < MEMBERS:
             prior = _prior(speed.lowest + speed.step * (k - TURN_MEMBERS))
         # Scores of zero where there are none yet: rows begin with that.
-        member = load_across(Member, bank, BANK, k)
-        store_across(bank, BANK, k, member._replace(belief=belief, prior=prior))
+        member = load_across(Member, bank, LANES, k)
+        store_across(bank, LANES, k, member._replace(belief=belief, prior=prior))
 
 
 @kernel
@@ -257,7 +257,7 @@ def _scored(
 def _noise_by_members(bank: Rows[Member], found: ProcessNoise, rules: ProcessLearning) -> None:
     """Give every member its noise: what is found, with one density in the place of that."""
     tried_turn, tried_speed = rules.turn * TURN_LOWEST, rules.speed * SPEED_LOWEST
-    for k in range(BANK):
+    for k in range(LANES):
         q_v, q_u = found.q_v, found.q_u
         if k < TURN_MEMBERS:
             q_u = tried_turn
@@ -265,7 +265,7 @@ def _noise_by_members(bank: Rows[Member], found: ProcessNoise, rules: ProcessLea
         elif k < MEMBERS:
             q_v = tried_speed
             tried_speed = tried_speed * SPEED_RATIO
-        store_across(bank, BANK, k, load_across(Member, bank, BANK, k)._replace(q_v=q_v, q_u=q_u))
+        store_across(bank, LANES, k, load_across(Member, bank, LANES, k)._replace(q_v=q_v, q_u=q_u))
 
 
 class Range(NamedTuple):
@@ -317,7 +317,7 @@ def _taken(bank: Rows[Member], rules: ProcessLearning, before: float, dt: float,
 @kernel
 def _posterior(bank: Rows[Member], k: int) -> float:
     """Score of a member with what is told."""
-    member = load_across(Member, bank, BANK, k)
+    member = load_across(Member, bank, LANES, k)
     return member.score + member.prior
 
 

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.station_keeper import at_station
-from estimation.consistency.filter_bank import BANK, Member
+from estimation.consistency.filter_bank import Member
+from estimation.consistency.slip_estimate import BANK
 from estimation.filters.filter import Filter
 from estimation.own_motion.odometry_check import WayEntry
 from estimation.own_motion.odometry_history import MotionSample

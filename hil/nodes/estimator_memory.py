@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.consistency.filter_bank import BANK, Member
+from estimation.consistency.filter_bank import Member
+from estimation.consistency.slip_estimate import BANK
 from estimation.filters.filter import Filter
 from estimation.own_motion.odometry_check import OdometrySample, WayEntry
 from estimation.own_motion.odometry_history import (
@@ -50,6 +51,7 @@ from hil.nodes.node import Counts
 from hil.nodes.refusals import COUNTED, REFUSALS, TAKEN, TAKEN_FRAME
 from hil.nodes.status_reasons import ALL_REASONS
 from hil.scenario.leader_model import (
+    finds_slip,
     follower_mount,
     input_trust,
     leader_filter,
@@ -102,6 +104,7 @@ def rules_of(scenario: Scenario) -> Rules:
         own_noise=own_noise(scenario),
         noise_learning=noise_learning(scenario),
         process_learning=process_learning(scenario),
+        learns_slip=finds_slip(scenario),
         mounts=MountRules(follower_mount(scenario), scenario.controller.mount_check == "stop"),
     )
 
@@ -283,6 +286,12 @@ class EstimatorMemory:
     def history(self) -> History:
         """Odometry, oldest first."""
         return tuple(_held(MotionSample, self.desk.history, self.known.odometry))
+
+    @property
+    def ways(self) -> tuple[WayEntry, ...]:
+        """Ways of odometry and the follower's own track, oldest first, where both are known."""
+        check = self.known.odometry_check
+        return tuple(_held(WayEntry, self.desk.ways, check.entries)[: check.paired])
 
     @property
     def receipts(self) -> tuple[Receipt, ...]:

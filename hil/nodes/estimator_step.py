@@ -11,7 +11,12 @@ from estimation.consistency.noise_estimate import (
     Moment,
     scaled_noise,
 )
-from estimation.consistency.process_estimate import learn, learned_noise, restarted
+from estimation.consistency.process_estimate import (
+    learn,
+    learned_noise,
+    restarted,
+)
+from estimation.consistency.slip_estimate import LearnedSlip, learn_slip
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import (
     Measurement,
@@ -19,8 +24,8 @@ from estimation.models.measurement import (
     measure_body_anchored,
     measure_body_from_mocap,
     measure_world,
+    seen_in_range,
 )
-from estimation.own_motion.interval_motion import motion_between
 from estimation.own_motion.odometry_check import POSE, TRACK, OdometrySample, with_sample
 from estimation.own_motion.odometry_history import (
     MotionSample,
@@ -78,9 +83,9 @@ from hil.nodes.own_motion_step import (
     by_pose,
     due_pose,
     finds_odometry_noise,
-    is_fresh,
     own_again,
     source_now,
+    way_known,
     with_answer,
     with_judged_odometry,
 )
@@ -165,25 +170,10 @@ def measured(rules: Rules, capture_ns: int, seen: PairSeen, motion: FollowerMoti
     leader = (seen.leader_x, seen.leader_y)
     if rules.filter.in_world:
         return measure_world(capture_ns, leader, seen.follower, rules.noise, motion)
-    if rules.source == MOCAP:
+    # Where a frame shows the follower's own pose, no odometry knows better how far it has turned.
+    if rules.source == MOCAP or rules.source == AUTO:
         return measure_body_anchored(capture_ns, leader, seen.follower, rules.noise, motion)
     return measure_body_from_mocap(capture_ns, leader, seen.follower, rules.noise, motion)
-
-
-@kernel
-def _with_way(known: Known, memory: Memory, rules: Rules, measurement: Measurement, k: int) -> Measurement:
-    """Measurement, the track's k-th, with the way by odometry since the one before, where that counts."""
-    if rules.filter.in_world or measurement.anchored or k == 0 or known.odometry.length == 0:
-        return measurement
-    to_ns = measurement.capture_ns
-    by_sample = rules.source == ODOMETRY or not measurement.framed
-    if not by_sample and (rules.source != AUTO or not is_fresh(known, rules, to_ns)):
-        return measurement._replace(has_way=False)
-    from_ns = capture_at(memory.points, known.track, k - 1)
-    if from_ns >= to_ns:
-        return measurement
-    way = motion_between(memory.history, known.odometry, (from_ns, to_ns), rules.trust, known.correction)
-    return measurement._replace(has_way=True, way=way)
 
 
 @kernel
@@ -193,7 +183,7 @@ def take(knowns: Rows[Known], memory: Memory, rules: Rules, measurement: Measure
     points, ring = memory.points, known.track
     late = ring.length > 0 and measurement.capture_ns < capture_at(points, ring, ring.length - 1)
     before = place_of(points, ring, measurement.capture_ns)
-    measurement = _with_way(known, memory, rules, measurement, before)
+    measurement = way_known(known, memory, rules, measurement, before)
     learning, estimator = rules.process_learning, rules.filter
     if learning.on:
         estimator = estimator.driven_by(learned_noise(known.process, learning))
@@ -204,6 +194,11 @@ def take(knowns: Rows[Known], memory: Memory, rules: Rules, measurement: Measure
         _shorten_way(load(Known, knowns, 0), memory, rules, measurement.capture_ns)
     if learning.on and not late:
         _learn(knowns, memory, rules, added.verdict)
+    if rules.learns_slip and not late and added.ring.length > 1:
+        # Of the newest odometry may still come; the one before it has been folded with all there is.
+        settled = point_at(points, added.ring, added.ring.length - 2)
+        slips = within(Known, knowns, 0, "slip")
+        store(slips, 0, learn_slip(load(LearnedSlip, slips, 0), memory.bank, settled, rules.filter))
     if rules.filter.in_world and not late:
         point, settings = newest(points, added.ring), rules.settings
         travels = within(Known, knowns, 0, "travel")
@@ -217,7 +212,7 @@ def _shorten_way(known: Known, memory: Memory, rules: Rules, capture_ns: int) ->
     """Give what comes after a measurement that came late its way since that one."""
     points, ring = memory.points, known.track
     k = place_of(points, ring, capture_ns) + 1
-    after = _with_way(known, memory, rules, point_at(points, ring, k).measurement, k)
+    after = way_known(known, memory, rules, point_at(points, ring, k).measurement, k)
     if _put_measurement(known, memory, k, after):
         reprocessed(points, ring, k, rules.settings, rules.filter)
 
@@ -231,11 +226,14 @@ def _learn(knowns: Rows[Known], memory: Memory, rules: Rules, verdict: int) -> N
     if verdict != USED:
         return
     point = newest(memory.points, known.track)
-    # Where commands stand in for motion, innovations tell how the follower obeys, not how the leader drives.
-    obeys = point.measurement.has_way and rules.trust.lag > 0.0
-    if not obeys and point.period <= SELDOM:
-        learned = learn(known.process, memory.bank, point, rules.process_learning, rules.filter)
-        store(processes, 0, learned)
+    if point.period > SELDOM:
+        return
+    if point.measurement.has_way and rules.trust.lag > 0.0:
+        # Where commands stand in for motion, what is seen across the line of sight tells how the follower
+        # obeys, not how the leader drives.
+        point = point._replace(measurement=seen_in_range(point.measurement))
+    learned = learn(known.process, memory.bank, point, rules.process_learning, rules.filter)
+    store(processes, 0, learned)
 
 
 @kernel
@@ -305,7 +303,7 @@ def _with_odometry(known: Known, memory: Memory, rules: Rules, first: int) -> bo
         else:
             motion = by_odometry(known, memory, rules, capture_ns)
         measurement = with_motion(point, motion).measurement
-        measurement = _with_way(known, memory, rules, measurement, k)
+        measurement = way_known(known, memory, rules, measurement, k)
         changed = _put_measurement(known, memory, k, measurement) or changed
     return changed
 
@@ -360,4 +358,5 @@ def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) 
     waits = status in (TRACKING, INITIALISING)
     if waits and rules.mounts.stops and is_off(known.mount_check):
         status, cause = REJECTING, MOUNT
+    point = point._replace(belief=rules.filter.told_speed(point.belief))
     return Told(guessed_when_slow(estimate_at(point, status), rules.filter.limits.v_eps), cause)

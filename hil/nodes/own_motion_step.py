@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from estimation.consistency.slip_estimate import with_slip
 from estimation.models.coordinated_turn import FollowerMotion
-from estimation.models.measurement import PairSeen
+from estimation.models.measurement import Measurement, PairSeen
+from estimation.own_motion.interval_motion import motion_between
 from estimation.own_motion.judged_odometry import age_of, aged, fresh_for, is_better, with_own_track
 from estimation.own_motion.odometry_check import (
     POSE,
@@ -32,10 +34,11 @@ from estimation.own_motion.own_track import (
     own_predicted,
     own_reprocessed,
 )
+from estimation.tracking.tracker import capture_at
 from formation.kernel import kernel
 from formation.records import Rows, load, store, within
 from formation.ring import place
-from hil.nodes.estimator_records import AUTO, FUSED, MOCAP, Known, Memory, Rules
+from hil.nodes.estimator_records import AUTO, FUSED, MOCAP, ODOMETRY, Known, Memory, Rules
 
 _NS = 1e-9
 
@@ -43,7 +46,25 @@ _NS = 1e-9
 @kernel
 def by_odometry(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
     """Motion of the follower as odometry tells it, put right where that is known to be wrong."""
-    return follower_motion(memory.history, known.odometry, capture_ns, rules.trust, known.correction)
+    motion = follower_motion(memory.history, known.odometry, capture_ns, rules.trust, known.correction)
+    return with_slip(motion, known.slip) if rules.learns_slip else motion
+
+
+@kernel
+def way_known(known: Known, memory: Memory, rules: Rules, measurement: Measurement, k: int) -> Measurement:
+    """Measurement, the track's k-th, with the way by odometry since the one before, where that counts."""
+    if rules.filter.in_world or measurement.anchored or k == 0 or known.odometry.length == 0:
+        return measurement
+    to_ns = measurement.capture_ns
+    if measurement.framed and rules.source != ODOMETRY:
+        return measurement._replace(has_way=False)
+    from_ns = capture_at(memory.points, known.track, k - 1)
+    if from_ns >= to_ns:
+        return measurement
+    way = motion_between(memory.history, known.odometry, (from_ns, to_ns), rules.trust, known.correction)
+    if rules.learns_slip:
+        way = with_slip(way, known.slip)
+    return measurement._replace(has_way=True, way=way)
 
 
 @kernel
@@ -171,8 +192,8 @@ def _judge_odometry(knowns: Rows[Known], memory: Memory, rules: Rules) -> None:
 
 @kernel
 def finds_odometry_noise(rules: Rules) -> bool:
-    """Whether the noise of odometry is found; along the follower's axes slip and lag are told for it."""
-    return rules.noise_learning.learns and rules.filter.in_world
+    """Whether the noise of odometry is found by the own track; of commands in its place a lag is told."""
+    return rules.noise_learning.learns and rules.trust.lag == 0.0
 
 
 @kernel

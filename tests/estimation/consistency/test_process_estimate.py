@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from benchmarks.random_leaders import random_leader
 from estimation.consistency.filter_bank import (
-    BANK,
+    LANES,
     MEMBERS,
     SPEED_LOWEST,
     SPEED_MEMBERS,
@@ -78,7 +78,7 @@ def found_for(
     truth = ProcessNoise.by_rule(LIMITS, turn, speed)
     start = np.array([0.0, 0.0, 0.08, 0.0, 0.0])
     states = random_leader(generator, start, round(seconds / STEP), STEP, truth)
-    estimator, bank, learned = main_filter(rules), rows_of(Member, BANK), NOTHING_LEARNED
+    estimator, bank, learned = main_filter(rules), rows_of(Member, LANES), NOTHING_LEARNED
     belief = estimator.start(sighted(generator, 0, states[0]))._replace(vx=0.08, vx_vx=1e-6, vy_vy=1e-6)
     for k, state in enumerate(states):
         measurement = sighted(generator, k + 1, state)
@@ -104,7 +104,7 @@ def test_the_bandwidths_of_a_leader_are_found_whatever_is_told(
 
 def test_before_the_track_has_settled_it_is_as_told() -> None:
     rules, generator = learning(0.5, 0.01), np.random.default_rng(1)
-    estimator, bank, learned = main_filter(rules), rows_of(Member, BANK), NOTHING_LEARNED
+    estimator, bank, learned = main_filter(rules), rows_of(Member, LANES), NOTHING_LEARNED
     for k in range(60):
         measurement = sighted(generator, k, np.zeros(5))
         learned = learn(learned, bank, begun(measurement, estimator), rules, estimator)
@@ -118,7 +118,7 @@ def test_a_new_track_starts_the_bank_anew_and_keeps_what_was_learned() -> None:
     learned, bank = found_for(0.05, 0.001, rules)
     again = restarted(learned)
     assert (again.speed, again.turn, again.begun) == (learned.speed, learned.turn, False)
-    scores = [load_across(Member, bank, BANK, k).score for k in range(MEMBERS)]
+    scores = [load_across(Member, bank, LANES, k).score for k in range(MEMBERS)]
     there = np.array([5.0, 5.0, 0.08, 0.0, 0.0])
     k = 1000
     while not again.begun:
@@ -127,17 +127,17 @@ def test_a_new_track_starts_the_bank_anew_and_keeps_what_was_learned() -> None:
         here = point(measurement, estimator.start(measurement), estimator)
         again = learn(again, bank, here, rules, estimator)
         k += 1
-    assert [load_across(Member, bank, BANK, k).score for k in range(MEMBERS)] == scores
-    assert load_across(Member, bank, BANK, 3).belief.x == pytest.approx(5.0, abs=0.1)
+    assert [load_across(Member, bank, LANES, k).score for k in range(MEMBERS)] == scores
+    assert load_across(Member, bank, LANES, 3).belief.x == pytest.approx(5.0, abs=0.1)
 
 
 @pytest.mark.parametrize("k", range(TURN_MEMBERS, MEMBERS))
 def test_a_little_evidence_for_one_member_does_not_take_the_noise_there(k: int) -> None:
     """Where nothing tells members apart it is near what is told, and a nat for one of them changes little."""
-    bank, rules = rows_of(Member, BANK), learning(0.5, 0.01)
-    _begin(bank, load_across(Member, bank, BANK, 0).belief, rules)
+    bank, rules = rows_of(Member, LANES), learning(0.5, 0.01)
+    _begin(bank, load_across(Member, bank, LANES, 0).belief, rules)
     none = _taken(bank, rules, 0.0, 0.0, False)
-    store_across(bank, BANK, k, load_across(Member, bank, BANK, k)._replace(score=1.0))
+    store_across(bank, LANES, k, load_across(Member, bank, LANES, k)._replace(score=1.0))
     one = _taken(bank, rules, 0.0, 0.0, False)
     assert abs(math.log(none)) < math.log(5.0)
     assert abs(math.log(one / none)) < math.log(8.0)
