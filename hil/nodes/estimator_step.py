@@ -42,8 +42,7 @@ from estimation.tracking.estimate import estimate_at, guessed_when_slow
 from estimation.tracking.follower_check import BELIEVED, MOUNT
 from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
 from estimation.tracking.follower_check import GATED as LEADER_OFF
-from estimation.tracking.mount_check import MountCheck, is_off
-from estimation.tracking.mount_check import watched as mount_watched
+from estimation.tracking.mount_check import MountCheck, is_off, mount_checked
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE, RESTARTED, USED, TrackPoint, with_motion
 from estimation.tracking.tracker import (
     INITIALISING,
@@ -57,7 +56,7 @@ from estimation.tracking.tracker import (
     reprocessed,
     status_of,
 )
-from estimation.tracking.travel_watch import TravelWatch, watched
+from estimation.tracking.travel_watch import TravelWatch, travel_watched
 from formation.kernel import kernel
 from formation.mount import robot_pose
 from formation.records import Rows, load, store, within
@@ -122,7 +121,7 @@ def take_frame(knowns: Rows[Known], memory: Memory, rules: Rules, capture_ns: in
     if taken.cause == BELIEVED or taken.cause == LEADER_OFF or taken.cause == FOLLOWER_OFF:
         jumped, checks = taken.verdict == RESTARTED, within(Known, knowns, 0, "mount_check")
         check = load(MountCheck, checks, 0)
-        store(checks, 0, mount_watched(check, capture_ns, seen.follower, using.noise, jumped))
+        store(checks, 0, mount_checked(check, capture_ns, seen.follower, using.noise, jumped))
     if learns:
         begins = load(Known, knowns, 0).process.begun and not begun
         learn_noise(knowns, memory, rules, Moment(capture_ns, seen), taken.cause != BELIEVED, begins)
@@ -203,7 +202,7 @@ def take(knowns: Rows[Known], memory: Memory, rules: Rules, measurement: Measure
         point, settings = newest(points, added.ring), rules.settings
         travels = within(Known, knowns, 0, "travel")
         travel = load(TravelWatch, travels, 0)
-        store(travels, 0, watched(travel, point, settings.lost_after, rules.filter.limits))
+        store(travels, 0, travel_watched(travel, point, settings.lost_after, rules.filter.limits))
     return Taken(added.verdict, cause, late)
 
 
