@@ -43,6 +43,7 @@ FAULTS: Mapping[str, str] = {
     "slip 0.2": 'kind="slip", factor=0.2',
     "slip 0.5": 'kind="slip", factor=0.5',
     "reset": 'kind="reset"',
+    "commands": 'kind="commands"',
 }
 
 

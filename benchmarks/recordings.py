@@ -1,6 +1,8 @@
 """How well leaders of real recordings are estimated: MRCLAM pairs by every front end, a TurtleBot3 by LiDAR.
 
-    ABREAST_REAL=FOLDER python benchmarks/recordings.py [--only camera] [--set KEY=VALUE] [--each]
+    ABREAST_REAL=DIR python benchmarks/recordings.py [--only camera] [--set KEY=VALUE] [--answered] [--each]
+
+The LiDAR has a row as it is, and one with the offsets that ``abreast calibrate`` finds in its first 6.6 s.
 
 One line for each way of measuring, medians over pairs: RMSE of v1 while tracking, that over the RMSE of the
 best constant guess (over the same samples, and over all that is known of the leader), median error of alpha1,
@@ -27,8 +29,12 @@ from hil.judge.estimation import errors_at
 from hil.judge.replay_verdict import run_data_of_replay
 from hil.log.metadata import scenario_of
 from hil.log.reader import read_log
+from hil.recordings.column_map import load_column_map
+from hil.recordings.csv_import import import_csv
 from hil.recordings.mrclam_import import Sightings, import_mrclam
+from hil.replay.calibration import calibrate
 from hil.replay.rerun import replay
+from hil.replay.timing import timing_of
 from hil.scenario.files import with_overrides
 
 PAIRS = ((1, 2), (2, 3), (3, 4), (4, 5), (5, 1), (3, 1))
@@ -41,17 +47,25 @@ WAYS: tuple[tuple[str, Sightings, tuple[str, ...]], ...] = (
     ("world", "vicon", ()),
     ("body, odometry", "vicon", ("front_end='body'", "own_motion='odometry'")),
     ("body, mocap motion", "vicon", ("front_end='body'", "own_motion='mocap'")),
+    ("body, auto", "vicon", ("front_end='body'", "own_motion='auto'")),
     ("camera", "camera", ()),
 )
+LIDAR, CALIBRATED_TO = "turtlebot3_lidar_optitrack", 6.6
 FIGURES = ("v1", "/const", "/guess", "alpha1", "corr", "tracked", ">5sd", "nees v1", "nees alpha1", "nis")
 
 
-def figures_of(log: Path, overrides: Sequence[str] = ()) -> list[float]:
-    """Figures of one log, replayed with keys of its scenario changed."""
+def figures_of(log: Path, overrides: Sequence[str] = (), *, answered: bool = False) -> list[float]:
+    """Figures of one log, replayed with keys of its scenario changed.
+
+    ``answered``: with what ``abreast calibrate`` finds of how its motion answers its odometry.
+    """
     opened = read_log(log)
     own = scenario_of(opened)
     if own is None:
         raise SystemExit(f"{log}: was not made by abreast")
+    if answered:
+        found = timing_of(opened, own).settings(own)
+        own = with_overrides(own, [f"{key}={value}" for key, value in found.items() if ".input_" in key])
     scenario = with_overrides(own, [f"estimator.{each}" for each in overrides])
     columns = columns_of(run_data_of_replay(opened, replay(opened, scenario)))
     samples, v_eps = columns.samples, scenario.leader.v_eps
@@ -89,6 +103,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", default="", help="ways whose name has this in it")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="of the estimator")
+    parser.add_argument("--answered", action="store_true", help="odometry as calibrate says it is answered")
     parser.add_argument("--each", action="store_true", help="print every pair")
     given = parser.parse_args()
     real = Path(os.environ["ABREAST_REAL"])
@@ -102,10 +117,24 @@ def main() -> None:
                 log = Path(folder) / f"{sightings}{leader}{follower}.mcap"
                 if not log.exists():
                     import_mrclam(real / "mrclam6", leader, follower, log, sightings)
-                rows.append(figures_of(log, [*overrides, *given.set]))
+                rows.append(figures_of(log, [*overrides, *given.set], answered=given.answered))
                 if given.each:
                     _print(f"  {leader} seen by {follower}", rows[-1])
             _print(name, np.nanmedian(np.array(rows), axis=0).tolist())
+        if given.only in "lidar":
+            log = Path(folder) / "lidar.mcap"
+            import_csv(real / f"{LIDAR}.csv", load_column_map(LIDAR), log)
+            _print("lidar", figures_of(log, given.set))
+            _print("lidar, calibrated", figures_of(log, [*_offsets(log), *given.set]))
+
+
+def _offsets(log: Path) -> list[str]:
+    """Keys of the estimator by which a sensor is put right, from the first seconds of its log."""
+    opened = read_log(log)
+    scenario = scenario_of(opened)
+    assert scenario is not None
+    found = calibrate(opened, scenario, None, CALIBRATED_TO)
+    return [f"range_bias={found.range.value}", f"bearing_bias={found.bearing.value}"]
 
 
 def _print(name: str, row: Sequence[float]) -> None:

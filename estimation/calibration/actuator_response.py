@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.models.motion import Matrix, Vector
+from estimation.own_motion.block_errors import sandwich
 from estimation.own_motion.input_alignment import Known
+from estimation.own_motion.lagged_signal import LaggedSignal, Twists, columns_of
 from formation.angles import FloatArray
 
 EARLIEST, LATEST = -0.2, 0.6
@@ -36,10 +37,9 @@ _GRID = 0.02  # of delays [s]
 _LAGS = (0.005, 0.03, 0.06, 0.1, 0.15, 0.25, 0.4, 0.7)
 _STEP = 1e-3  # for the slopes by delay and lag [s]
 _JUMPY = 0.01  # a lag below this [s] answers in jumps, and no sample notices a short step
-_SHORTEST_LAG = 1e-6
 _STILL = 1.0  # a robot that was told to stand for longer [s] tells nothing
 _LEAST_SCALE = 1e-5  # [m/s], [rad/s]: no odometry is finer
-_BLOCKS, _BLOCK = 8, 1.0  # errors of one block, of this length [s] or longer, may be alike
+_BLOCK = 1.0  # [s] within which errors may be alike
 _CLEARLY = 10.0  # by which the loss has to fall
 _FAR = 4.0  # scales off the fit: an outlier
 
@@ -82,7 +82,7 @@ def fit_response(
     times, measured = times[chosen], measured[chosen]
     if len(times) < FEWEST or np.any(np.ptp(measured, axis=0) == 0.0):
         return None
-    answers = _Answers(command_times, commanded, times)
+    answers = _Answers(LaggedSignal(command_times, commanded, held=True), times)
     start, scales = _nearest(answers, measured)
     coarse = _Fit(answers, measured, scales)
     p = coarse.solved(np.array([*start, 1.0, 0.0, 1.0, 0.0]), EARLIEST)
@@ -94,29 +94,18 @@ def fit_response(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Answers:
-    """Answers to what was ``commanded`` at ``command_times``, v + i u, at the times of the measurements."""
+    """Answers to commands at the times of the measurements."""
 
-    command_times: Vector
-    commanded: NDArray[np.complex128]
+    commands: LaggedSignal
     times: Vector
 
-    def states(self, lag: float) -> NDArray[np.complex128]:
+    def states(self, lag: float) -> Twists:
         """Answer without delay at the very time of every command."""
-        kept = np.exp(-np.diff(self.command_times) / max(lag, _SHORTEST_LAG)).tolist()
-        steps = zip(self.commanded.tolist(), kept, strict=False)
-        states = accumulate(
-            steps, lambda state, step: step[0] + (state - step[0]) * step[1], initial=self.commanded[0]
-        )
-        return np.array(list(states))
+        return self.commands.states(lag)
 
-    def seen(self, states: NDArray[np.complex128], delay: float, lag: float) -> FloatArray:
+    def seen(self, states: Twists, delay: float, lag: float) -> FloatArray:
         """Answers (n, 2) at the measurements, by the states of the lag."""
-        at = self.times - delay
-        place = np.maximum(np.searchsorted(self.command_times, at, side="right") - 1, 0)
-        since = np.maximum(at - self.command_times[place], 0.0)
-        left = (states[place] - self.commanded[place]) * np.exp(-since / max(lag, _SHORTEST_LAG))
-        answer = self.commanded[place] + left
-        return np.column_stack([answer.real, answer.imag])
+        return columns_of(self.commands.answers(self.times - delay, lag, states))
 
     def of(self, delay: float, lag: float) -> FloatArray:
         """Answers (n, 2) at the measurements."""
@@ -194,18 +183,8 @@ class _Fit:
         slopes = self._slopes(p)
         # The loss 2 (sqrt(1 + r^2) - 1) pulls by r / sqrt(1 + r^2), which grows by (1 + r^2)^(-3/2).
         pulls = slopes * (off / np.sqrt(1.0 + off**2))[:, np.newaxis]
-        try:
-            inverse = np.linalg.inv(slopes.T @ (slopes * ((1.0 + off**2) ** -1.5)[:, np.newaxis]))
-        except np.linalg.LinAlgError:
-            return None
-        times = self.answers.times
-        count = max(_BLOCKS, math.floor((times[-1] - times[0]) / _BLOCK))
-        block = np.minimum((times - times[0]) / (times[-1] - times[0]) * count, count - 1).astype(np.int64)
-        sums = np.zeros((count, 6))
-        np.add.at(sums, np.tile(block, 2), pulls)
-        meat = np.stack([pulls.T @ pulls, sums.T @ sums * count / (count - 1)])
-        covariance: FloatArray = inverse @ meat @ inverse
-        return covariance if np.all(np.isfinite(covariance)) else None
+        information = slopes.T @ (slopes * ((1.0 + off**2) ** -1.5)[:, np.newaxis])
+        return sandwich(information, pulls, self.answers.times, _BLOCK)
 
 
 def _telling(command_times: Vector, commanded: NDArray[np.complex128], times: Vector) -> NDArray[np.bool_]:

@@ -137,6 +137,10 @@ class Interpreted:
         """See :meth:`~estimation.filters.filter.Filter.leader`; no lever arm is known of here."""
         return belief
 
+    def told_speed(self, belief: Gaussian) -> Gaussian:
+        """Itself; see :meth:`~estimation.filters.filter.Filter.told_speed`."""
+        return belief
+
     def step(
         self, belief: Gaussian, dt: float, follower: FollowerMotion, measurement: Measurement, gate: float
     ) -> Stepped:

@@ -18,6 +18,8 @@ from estimation.filters.gaussian import Gaussian
 from estimation.models.coordinated_turn import LeaderLimits, ProcessNoise
 from formation.kernel import kernel
 
+_LEAST_SPEED = 1e-9  # [m/s]; below it there is no direction
+
 
 class _Column(NamedTuple):
     """Covariance of a quantity with the state."""
@@ -52,13 +54,7 @@ def within_limits(b: Gaussian, dt: float, noise: ProcessNoise, limits: LeaderLim
     if speed <= middle or limits.k_v <= least:
         return b
     c, s = b.vx / speed, b.vy / speed
-    along = _Column(
-        c * b.x_vx + s * b.x_vy,
-        c * b.y_vx + s * b.y_vy,
-        c * b.vx_vx + s * b.vx_vy,
-        c * b.vx_vy + s * b.vy_vy,
-        c * b.vx_u + s * b.vy_u,
-    )
+    along = _along(b, c, s)
     # A speed says the more of a velocity the better its direction is known.
     across = c * c * b.vy_vy - 2.0 * c * s * b.vx_vy + s * s * b.vx_vx
     weight = 1.0 - across / (speed * speed)
@@ -68,6 +64,34 @@ def within_limits(b: Gaussian, dt: float, noise: ProcessNoise, limits: LeaderLim
     known = span * span * (1.0 / 12.0)
     variance = known * known / (weight * weight * noise.q_v * dt)
     return _told(b, along, c * along.vx + s * along.vy, middle - speed, variance)
+
+
+@kernel(inline=False)
+def usual_speed(b: Gaussian, limits: LeaderLimits) -> Gaussian:
+    """Belief with the speeds that a leader may have: any from v_eps to k_v is as likely as another.
+
+    Along the direction in which it seems to drive it is told their middle, with their variance. To be told
+    over and over that would hold a direction that is wrong, so that this is for what goes out, and nothing is
+    carried on from it. Where the speed is measured well it makes no difference.
+    """
+    speed, span = math.sqrt(b.vx * b.vx + b.vy * b.vy), limits.k_v - limits.v_eps
+    if speed <= _LEAST_SPEED or span <= 0.0:
+        return b
+    along = _along(b, b.vx / speed, b.vy / speed)
+    own = (b.vx * along.vx + b.vy * along.vy) / speed
+    return _told(b, along, own, 0.5 * (limits.k_v + limits.v_eps) - speed, span * span * (1.0 / 12.0))
+
+
+@kernel
+def _along(b: Gaussian, c: float, s: float) -> _Column:
+    """Column of the velocity along a direction."""
+    return _Column(
+        c * b.x_vx + s * b.x_vy,
+        c * b.y_vx + s * b.y_vy,
+        c * b.vx_vx + s * b.vx_vy,
+        c * b.vx_vy + s * b.vy_vy,
+        c * b.vx_u + s * b.vy_u,
+    )
 
 
 @kernel

@@ -184,6 +184,13 @@ def measure_body_anchored(
 
 
 @kernel
+def seen_in_range(measurement: Measurement) -> Measurement:
+    """A measurement along the follower's axes whose range counts, its bearing being off by a radian."""
+    x, y, spread = measurement.x, measurement.y, measurement.spread
+    return measurement._replace(spread=Spread(spread.xx + y * y, spread.xy - x * y, spread.yy + x * x))
+
+
+@kernel
 def way_between(before: Pose, after: Pose, dt: float) -> FollowerMotion:
     """Mean motion that leads from one pose to another in dt [s], as if there were no error in either."""
     turn, dx, dy = wrapped(after.theta - before.theta), after.x - before.x, after.y - before.y

@@ -1,33 +1,48 @@
-"""How odometry relates to the motion that mocap saw: how much later the robot moves, and by what share of it.
+"""How odometry relates to the motion that mocap saw: how late and how fast the robot answers, by what share.
 
 Both are averaged over the same windows, odometry as the integral of its samples, mocap as the way between two
-poses, so that no filter comes between them. Motion is then taken for scale times odometry ``delay`` earlier.
+poses, so that no filter comes between them. Motion is then taken for scale times what a first-order lag makes
+of odometry ``delay`` earlier: commands that stand in for odometry are answered so, by one link and one motor
+driver for both v and u. Wheel odometry has no lag, and a delay alone is told where it does as well.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.models.motion import Matrix, Vector
-from formation.angles import wrap
+from estimation.own_motion.block_errors import sandwich
+from estimation.own_motion.lagged_signal import LaggedSignal, columns_of
+from formation.angles import FloatArray, wrap
 
 WINDOW = 0.5
 """Length [s] over which motion is averaged: mocap noise is then far below what a driven robot does."""
 
 LONGEST_DELAY = 1.0
-"""Delays of either sign up to this [s] are tried."""
+"""Delays and lags that add up to this [s] are tried, and delays of either sign."""
 
-_STEP = 0.1  # between windows [s]; they overlap, so that only one in WINDOW / _STEP counts as independent
+_STEPS = 5  # windows that begin in one; they overlap, so that only one of these counts as independent
+_STEP = WINDOW / _STEPS  # between windows [s]
 _GRID = 0.02  # of delays [s]
+_IN_STEP = round(_STEP / _GRID)
+_LAGS = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7)
 _APART = 0.3  # delays further than this [s] from the best one must be worse by _DROP
 _DROP = 4.5  # of log-likelihood: three standard deviations
+_SDS = 3.0  # that it stands for
 _LARGEST_SD_SCALE = 0.2
+_LARGEST_SD_LAG = 0.05  # [s]
 _FEWEST = 10  # independent windows
 _LONGEST_GAP = 0.2  # between two poses or two samples of odometry for a window to count [s]
+_SLOPE = 1e-3  # [s] by which a lag is changed for its slope
+_LEAST_LAG = 1e-3  # [s]; a shorter one is a delay to any measurement
+_ROUNDS, _HALVINGS = 8, 4
+_SETTLED = 0.01  # of log-likelihood that a step gains at least
+_BLOCK = 4.0  # [s]; slip is alike for longer than a manoeuvre
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,74 +55,227 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """``motion(t) = scale * odometry(t - delay)``; None for what the span does not let know.
+    """``motion(t) = scale * answer(t - delay)`` with ``lag * answer' = odometry - answer``; None: not known.
 
-    ``delay`` [s] is positive for odometry that runs ahead of the robot, as commands do.
+    ``delay`` [s] is positive for odometry that runs ahead of the robot, as commands do. ``lag`` [s] is 0
+    where a delay alone does as well, with what it may be at most as three standard deviations. ``late``: both
+    together, which are better known than how they share it.
     """
 
     delay: Known | None
     scale_v: Known | None
     scale_u: Known | None
+    lag: Known | None = None
+    late: Known | None = None
 
 
 UNKNOWN = Alignment(None, None, None)
 
 
-def align_odometry(times: Vector, poses: Matrix, odometry_times: Vector, odometry: Matrix) -> Alignment:
-    """Delay and scales of odometry (m, 2) v [m/s], u [rad/s] against a track (n, 3) x, y [m], theta [rad].
+class _Answer(NamedTuple):
+    """Delay and lag [s], the log-likelihood of the windows by them, the covariance with scales, if any."""
 
-    Times (n,), (m,) [s] increase and have one zero. Every delay of a grid gets its scales by least squares;
-    the profile likelihood of all delays, n/2 log of the residuals of both channels, gives the best and, by
-    its curvature, the standard deviation. A delay is unknown if another one far from it does about as well,
-    as where the robot hardly changes its motion; a scale is unknown if its standard deviation is above 0.2.
+    delay: float
+    lag: float
+    likelihood: float
+    covariance: FloatArray | None = None
+
+    @property
+    def sds(self) -> FloatArray:
+        """Standard deviations in the order of the covariance; infinite without one."""
+        if self.covariance is None:
+            return np.full(4, np.inf)
+        sds: FloatArray = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2).max(axis=0).clip(0.0))
+        return sds
+
+
+def align_odometry(times: Vector, poses: Matrix, odometry_times: Vector, odometry: Matrix) -> Alignment:
+    """Delay, lag and scales of odometry (m, 2) against a track (n, 3).
+
+    Odometry: v [m/s], u [rad/s]; track: x, y [m], theta [rad]. Times (n,), (m,) [s] increase and have one
+    zero. Every delay and lag of a grid gets its scales by least squares; the profile likelihood, n/2 log of
+    the residuals of both channels, tells the best, from which on the fit goes by Gauss-Newton steps. The lag
+    is 0 unless one makes the windows likelier by what stands for three standard deviations. Those are the
+    larger ones of what independent windows leave and what sums over blocks show. A delay is unknown if
+    another one far from it does about as well, as where the robot hardly changes its motion; a lag if 0.15 s
+    of it would do too; a scale if its standard deviation is above 0.2.
     """
     if len(times) < 2 or len(odometry_times) < 2:
         return UNKNOWN
     half, reach = 0.5 * WINDOW, 0.5 * WINDOW + LONGEST_DELAY
     first = max(times[0] + half, odometry_times[0] + reach)
     last = min(times[-1] - half, odometry_times[-1] - reach)
-    centres = np.arange(first, last, _STEP)
-    centres = centres[_covered(times, centres, half) & _covered(odometry_times, centres, reach)]
-    independent = len(centres) * _STEP / WINDOW
-    if independent < _FEWEST:
+    count = max(0, math.ceil((last - first) / _STEP))
+    places = np.arange(count)
+    centres = first + _STEP * places
+    covered = _covered(times, centres, half) & _covered(odometry_times, centres, reach)
+    places, centres = places[covered], centres[covered]
+    if len(centres) / _STEPS < _FEWEST:
         return UNKNOWN
-    seen = _mean_motion(times, poses, centres)
-    delays = np.arange(-LONGEST_DELAY, LONGEST_DELAY + 0.5 * _GRID, _GRID)
-    ways = _ways(odometry_times, odometry)
-    rests = np.array([_fit(seen, _mean_odometry(odometry_times, ways, centres - d))[1] for d in delays])
-    likelihood = -0.5 * independent * np.log(np.maximum(rests, 1e-12)).sum(axis=1)
-    best = int(np.argmax(likelihood))
-    delay = _peak(delays, likelihood, best)
-    by_odometry = _mean_odometry(odometry_times, ways, centres - (delay.value if delay else delays[best]))
-    scales, rest = _fit(seen, by_odometry)
-    power = np.mean(by_odometry**2, axis=0)
-    sds = np.sqrt(rest / np.maximum(power, 1e-12) / independent)
-    scale_v, scale_u = (
-        Known(scale, sd) if sd < _LARGEST_SD_SCALE else None
-        for scale, sd in zip(scales.tolist(), sds.tolist(), strict=True)
-    )
-    return Alignment(delay, scale_v, scale_u)
+    signal = LaggedSignal(odometry_times, odometry[:, 0] + 1j * odometry[:, 1], held=False)
+    return _Windows(signal, first, places, centres, _mean_motion(times, poses, centres)).alignment()
 
 
-def _fit(seen: Matrix, by_odometry: Matrix) -> tuple[Vector, Vector]:
-    """Scales (2,) through the origin by least squares, and the mean squares (2,) of what they leave."""
-    scales = np.sum(by_odometry * seen, axis=0) / np.maximum(np.sum(by_odometry**2, axis=0), 1e-12)
-    return scales, np.mean((seen - scales * by_odometry) ** 2, axis=0)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Windows:
+    """Mean motions ``seen`` (k, 2) over windows around the centres, ``places`` steps from the first."""
+
+    signal: LaggedSignal
+    first: float
+    places: NDArray[np.int64]
+    centres: Vector
+    seen: Matrix
+
+    def alignment(self) -> Alignment:
+        """What the windows tell."""
+        lates = np.arange(-LONGEST_DELAY, LONGEST_DELAY + 0.5 * _GRID, _GRID)
+        table = np.array([self._likelihoods(lates, lag) for lag in _LAGS])
+        row, column = np.unravel_index(np.argmax(table), table.shape)
+        alone = int(np.argmax(table[0]))
+        pure = self._refined(_Answer(float(lates[alone]), 0.0, float(table[0, alone])))
+        found, profile, best = pure, table[0], alone
+        if row > 0:
+            lag = _LAGS[row]
+            start = _Answer(float(lates[column]) - lag, lag, float(table[row, column]))
+            lagged = self._refined(start)
+            if lagged.likelihood - pure.likelihood > _DROP and lagged.sds[1] < _LARGEST_SD_LAG:
+                found, profile, best = lagged, table.max(axis=0), int(column)
+        scales = self._scales(found)
+        if not _stands_alone(lates, profile, best) or found.covariance is None:
+            return Alignment(None, *scales)
+        delay = Known(found.delay, float(found.sds[0]))
+        if found.lag == 0.0:
+            return Alignment(delay, *scales, _at_most(table), delay)
+        both = found.covariance[:, :2, :2].sum(axis=(1, 2))
+        late = Known(found.delay + found.lag, math.sqrt(float(np.max(both))))
+        return Alignment(delay, *scales, Known(found.lag, float(found.sds[1])), late)
+
+    def means(self, delay: float, lag: float) -> Matrix:
+        """Mean v and u (k, 2) of the lag's answer to odometry, so much earlier, over the windows."""
+        return self._means(self.centres - delay, lag)
+
+    def _means(self, centres: Vector, lag: float) -> Matrix:
+        states = self.signal.states(lag)
+        begins, ends = (
+            self.signal.answered_ways(centres + side, lag, states) for side in (-0.5 * WINDOW, 0.5 * WINDOW)
+        )
+        return columns_of(ends - begins) / WINDOW
+
+    def _likelihoods(self, lates: Vector, lag: float) -> Vector:
+        """Log-likelihoods of all sums of delay and lag; of a delay beyond what is tried that is no chance."""
+        whole, span = len(lates), int(self.places[-1]) * _IN_STEP
+        grid: FloatArray = (
+            self.first + lag - LONGEST_DELAY + _GRID * np.arange(span + whole, dtype=np.float64)
+        )
+        by_odometry = self._means(grid, lag)
+        chosen = (self.places * _IN_STEP)[np.newaxis, :] + np.arange(whole)[::-1, np.newaxis]
+        means = by_odometry[chosen]  # (lates, windows, 2)
+        _, rests = _fit(self.seen, means)
+        likelihoods = self._likelihood(rests)
+        return np.where(lates - lag < -LONGEST_DELAY, -np.inf, likelihoods)
+
+    def _likelihood(self, rests: FloatArray) -> FloatArray:
+        independent = len(self.places) / _STEPS
+        likelihood: FloatArray = -0.5 * independent * np.log(np.maximum(rests, 1e-12)).sum(axis=-1)
+        return likelihood
+
+    def _refined(self, start: _Answer) -> _Answer:
+        """The answer that fits best near a start: with a lag, or without one if it has none."""
+        here = self._judged(start.delay, start.lag)
+        for _ in range(_ROUNDS):
+            step = self._step(here)
+            if step is None:
+                break
+            ahead = here
+            for _ in range(_HALVINGS):
+                lag = max(_LEAST_LAG, here.lag + step[1]) if here.lag > 0.0 else 0.0
+                ahead = self._judged(here.delay + step[0], lag)
+                if ahead.likelihood > here.likelihood - _SETTLED:
+                    break
+                step = 0.5 * step
+            if not ahead.likelihood > here.likelihood + _SETTLED:
+                break
+            here = ahead
+        slopes, off = self._slopes(here)
+        covariance = sandwich(slopes.T @ slopes, slopes * off[:, np.newaxis], self.centres, _BLOCK, _STEPS)
+        return here._replace(covariance=covariance)
+
+    def _judged(self, delay: float, lag: float) -> _Answer:
+        if abs(delay) > LONGEST_DELAY or lag > LONGEST_DELAY:
+            return _Answer(delay, lag, -math.inf)
+        _, rests = _fit(self.seen, self.means(delay, lag))
+        return _Answer(float(delay), float(lag), float(self._likelihood(rests)))
+
+    def _step(self, here: _Answer) -> Vector | None:
+        """Gauss-Newton step of delay and lag, the latter 0 where there is none."""
+        slopes, off = self._slopes(here)
+        if not np.all(np.isfinite(slopes)):
+            return None
+        step = np.linalg.lstsq(slopes, -off, rcond=None)[0]
+        return np.array([step[0], step[1] if here.lag > 0.0 else 0.0])
+
+    def _slopes(self, here: _Answer) -> tuple[Matrix, Vector]:
+        """Slopes (2 k, p) of the residuals by delay, lag if there is one, and scales; the residuals (2 k,).
+
+        All in standard deviations of what the channel leaves, channel after channel.
+        """
+        delay, lag = here.delay, here.lag
+        states = self.signal.states(lag)
+        at = [self.centres - delay + side for side in (-0.5 * WINDOW, 0.5 * WINDOW)]
+        answers = [columns_of(self.signal.answers(each, lag, states)) for each in at]
+        ways = [columns_of(self.signal.ways(each)) for each in at]
+        means = (ways[1] - ways[0] - lag * (answers[1] - answers[0])) / WINDOW
+        scales, rests = _fit(self.seen, means)
+        by_delay = -(answers[1] - answers[0]) / WINDOW
+        by_lag = (self.means(delay, lag + _SLOPE) - means) / _SLOPE if lag > 0.0 else by_delay
+        columns = []
+        for k in range(2):
+            own = np.zeros((len(means), 2))
+            own[:, k] = means[:, k]
+            shapes = [scales[k] * by_delay[:, k], scales[k] * by_lag[:, k]][: 2 if lag > 0.0 else 1]
+            columns.append(np.column_stack([*shapes, own]))
+        sds = np.sqrt(np.maximum(rests, 1e-12))
+        off = (scales * means - self.seen) / sds
+        return np.vstack([columns[0] / sds[0], columns[1] / sds[1]]), off.T.ravel()
+
+    def _scales(self, found: _Answer) -> tuple[Known | None, Known | None]:
+        """Both scales by an answer, None for what is too uncertain."""
+        by_odometry = self.means(found.delay, found.lag)
+        scales, rest = _fit(self.seen, by_odometry)
+        power = np.mean(by_odometry**2, axis=0)
+        sds = np.sqrt(rest / np.maximum(power, 1e-12) / (len(self.places) / _STEPS))
+        if found.covariance is not None:
+            sds = np.maximum(sds, found.sds[-2:])
+        scale_v, scale_u = (
+            Known(scale, sd) if sd < _LARGEST_SD_SCALE else None
+            for scale, sd in zip(scales.tolist(), sds.tolist(), strict=True)
+        )
+        return scale_v, scale_u
 
 
-def _peak(delays: Vector, likelihood: Vector, best: int) -> Known | None:
-    """Vertex of the parabola through the best delay and its neighbours, if it stands alone."""
-    if not 0 < best < len(delays) - 1:
+def _fit(seen: Matrix, by_odometry: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Scales (..., 2) through the origin by least squares, and the mean squares of what they leave."""
+    power = np.maximum(np.einsum("...kc,...kc->...c", by_odometry, by_odometry), 1e-12)
+    both = np.einsum("...kc,kc->...c", by_odometry, seen)
+    left = np.einsum("kc,kc->c", seen, seen) - both * both / power
+    return both / power, np.maximum(left, 0.0) / len(seen)
+
+
+def _stands_alone(lates: Vector, profile: Vector, best: int) -> bool:
+    """Whether no other delay far from the best one does about as well, nor one beyond those tried."""
+    if not 0 < best < len(lates) - 1:
+        return False
+    apart = np.abs(lates - lates[best]) > _APART
+    return bool(profile[best] - np.max(profile[apart]) > _DROP)
+
+
+def _at_most(table: Matrix) -> Known | None:
+    """A lag of 0, three standard deviations off what the windows no longer bear; None if they bear any."""
+    bears = table.max(axis=1) > table[0].max() - _DROP
+    if bears[-1]:
         return None
-    apart = np.abs(delays - delays[best]) > _APART
-    if likelihood[best] - np.max(likelihood[apart]) < _DROP:
-        return None
-    before, top, after = likelihood[best - 1 : best + 2].tolist()
-    curvature = (before - 2.0 * top + after) / _GRID**2
-    if curvature >= 0.0:
-        return None
-    shift = 0.5 * (before - after) / (before - 2.0 * top + after) * _GRID
-    return Known(float(delays[best]) + shift, 1.0 / math.sqrt(-curvature))
+    sd = _LAGS[int(np.flatnonzero(bears)[-1]) + 1] / _SDS
+    return Known(0.0, sd) if sd < _LARGEST_SD_LAG else None
 
 
 def _mean_motion(times: Vector, poses: Matrix, centres: Vector) -> Matrix:
@@ -121,19 +289,6 @@ def _mean_motion(times: Vector, poses: Matrix, centres: Vector) -> Matrix:
     middle = ends[0][:, 2] + 0.5 * way[:, 2]
     chord = way[:, 0] * np.cos(middle) + way[:, 1] * np.sin(middle)
     return np.column_stack([chord / np.sinc(wrap(way[:, 2]) / (2.0 * np.pi)), way[:, 2]]) / WINDOW
-
-
-def _ways(times: Vector, odometry: Matrix) -> list[Vector]:
-    """What odometry, linear between samples, adds up to in v and in u since the first one."""
-    steps = 0.5 * (odometry[1:] + odometry[:-1]) * np.diff(times)[:, np.newaxis]
-    return [np.concatenate([[0.0], np.cumsum(column)]) for column in steps.T]
-
-
-def _mean_odometry(times: Vector, ways: list[Vector], centres: Vector) -> Matrix:
-    """Mean v and u (k, 2) of odometry that adds up to ``ways``, over the windows around the centres."""
-    begins, ends = (centres + side for side in (-0.5 * WINDOW, 0.5 * WINDOW))
-    sums = [np.interp(ends, times, way) - np.interp(begins, times, way) for way in ways]
-    return np.column_stack(sums) / WINDOW
 
 
 def _covered(times: Vector, centres: Vector, reach: float) -> NDArray[np.bool_]:

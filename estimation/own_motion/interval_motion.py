@@ -1,9 +1,10 @@
 """The follower's motion from one measurement to the next: odometry added up over all samples in between.
 
 Between slow sightings the motion at both ends tells little of what came in between. The signal, linear
-between samples, is integrated over the very interval, shifted by its delay. Of a further lag only a limit is
-known: every delay up to it is as likely as any other, so that the mean over some of them is taken, and what
-they differ by is what the lag may do.
+between samples, is integrated over the very interval, shifted by its delay; of a first-order lag that comes
+after it the integral is exact, too. Of what comes later still only a limit is known: every delay up to it is
+as likely as any other, so that the mean over some of them is taken, and what they differ by is what it may
+do.
 """
 
 from __future__ import annotations
@@ -16,10 +17,13 @@ from estimation.own_motion.odometry_history import (
     Correction,
     InputTrust,
     MotionSample,
+    answer_at,
     delay_ns,
+    left_of,
     motion_at,
     sample_at,
     sample_place,
+    time_constant_of,
 )
 from estimation.own_motion.own_track import ODOMETRY_CORRELATION
 from formation.kernel import kernel
@@ -58,6 +62,21 @@ def travelled(history: Rows[MotionSample], ring: Ring, from_ns: int, to_ns: int)
     return Travelled(v, u)
 
 
+@kernel
+def answer_travelled(
+    history: Rows[MotionSample], ring: Ring, from_ns: int, to_ns: int, time_constant: float
+) -> Travelled:
+    """The same of a lag's answer: the signal's, less its time constant times what the answer has gained."""
+    way = travelled(history, ring, from_ns, to_ns)
+    if time_constant <= 0.0:
+        return way
+    before = answer_at(history, ring, from_ns, time_constant)
+    after = answer_at(history, ring, to_ns, time_constant)
+    return Travelled(
+        way.v - time_constant * (after.v2 - before.v2), way.u - time_constant * (after.u2 - before.u2)
+    )
+
+
 @kernel(inline=False)
 def motion_between(
     history: Rows[MotionSample],
@@ -75,11 +94,12 @@ def motion_between(
     later_ns = delay_ns(trust, correction)
     from_ns, to_ns = interval_ns[0] - later_ns, interval_ns[1] - later_ns
     by = 1.0 / ((to_ns - from_ns) * _NS)
-    delays = _DELAYS if trust.lag > 0.0 else 1
+    time_constant, late = time_constant_of(trust, correction), left_of(trust, correction)
+    delays = _DELAYS if late > 0.0 else 1
     v, u, vv, uu = 0.0, 0.0, 0.0, 0.0
     for k in range(delays):
-        shift_ns = math.floor(trust.lag * k / (_DELAYS - 1) / _NS + 0.5)
-        way = travelled(history, ring, from_ns - shift_ns, to_ns - shift_ns)
+        shift_ns = math.floor(late * k / (_DELAYS - 1) / _NS + 0.5)
+        way = answer_travelled(history, ring, from_ns - shift_ns, to_ns - shift_ns, time_constant)
         v, u, vv, uu = (
             v + way.v * by,
             u + way.u * by,
@@ -88,7 +108,7 @@ def motion_between(
         )
     v, u = v / delays, u / delays
     late_v, late_u = max(0.0, vv / delays - v * v), max(0.0, uu / delays - u * u)
-    v, u = correction.scale_v * v, correction.scale_u * u
+    v, u = trust.scale_v * correction.scale_v * v, trust.scale_u * correction.scale_u * u
     slip_v, slip_u = trust.slip_v * v, trust.slip_u * u
     lasting = LASTING / ODOMETRY_CORRELATION
     return FollowerMotion(

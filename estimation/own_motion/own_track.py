@@ -126,7 +126,7 @@ def own_begun(
     return OwnPoint(capture_ns, pose, noise.pose, has_odometry, odometry, state, spread, capture_ns, 0)
 
 
-@kernel(inline=False)
+@kernel
 def own_followed(last: OwnPoint, due: OwnPoint, noise: OwnNoise) -> OwnPoint:
     """Fold the pose and odometry of ``due``, begun from its pose alone and newer than the point, into it."""
     if (due.capture_ns - last.used_ns) * _NS > _LONGEST:
@@ -289,7 +289,7 @@ def own_place(track: Rows[OwnPoint], ring: Ring, capture_ns: int) -> int:
     return k
 
 
-@kernel
+@kernel(inline=False)
 def own_predicted(track: Rows[OwnPoint], ring: Ring, due: OwnPoint, noise: OwnNoise) -> OwnPoint:
     """Point that the pose of ``due`` would become at its place, without putting it there.
 
@@ -321,17 +321,26 @@ def folded(track: Rows[OwnPoint], ring: Ring, due: OwnPoint, noise: OwnNoise, sp
         if k == 1:
             return ring
         ring, n, k = Ring(place(ring, track, 1), n - 1), n - 1, k - 1
-    point = own_point(track, ring, k - 1)
-    for at in range(k, n + 1):
-        later = own_point(track, ring, at) if at < n else due
-        point = own_followed(point, due, noise)
-        store(track, place(ring, track, at), point)
-        due = later
+    if k < n:
+        _folded_late(track, ring, due, noise, k)
+    else:
+        store(track, place(ring, track, n), own_followed(own_point(track, ring, n - 1), due, noise))
     ring = Ring(ring.first, n + 1)
     oldest_ns = own_point(track, ring, n).capture_ns - math.floor(span / _NS + 0.5)
     while ring.length > 1 and own_point(track, ring, 1).capture_ns < oldest_ns:
         ring = Ring(place(ring, track, 1), ring.length - 1)
     return ring
+
+
+@kernel(inline=False)
+def _folded_late(track: Rows[OwnPoint], ring: Ring, due: OwnPoint, noise: OwnNoise, k: int) -> None:
+    """Put ``due`` in as the ring's k-th point, for which it has room, and fold all later ones again."""
+    point = own_point(track, ring, k - 1)
+    for at in range(k, ring.length + 1):
+        later = own_point(track, ring, at) if at < ring.length else due
+        point = own_followed(point, due, noise)
+        store(track, place(ring, track, at), point)
+        due = later
 
 
 @kernel

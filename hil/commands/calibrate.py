@@ -14,6 +14,7 @@ from hil.log.report_json import print_json
 
 if TYPE_CHECKING:
     from estimation.calibration.sensor_bias import SensorBias
+    from estimation.own_motion.input_alignment import Known
     from hil.replay.lab_calibration import Calibration
     from hil.replay.mount_calibration import Mounts
 
@@ -23,6 +24,13 @@ _MEANINGS = {
     "delay_s": "both together, which are better known than how they share it",
     "stamp_offset_s": "mocap stamps are this much later than the robot's clock was",
     "transport_latency_s": "a frame is at least this old when it comes",
+}
+
+_RESPONSES = {
+    "input_delay_s": "the motion comes later than odometry tells it by this [s]",
+    "input_time_constant_s": "of the first-order lag by which it answers odometry [s]",
+    "input_scale_v": "true over told speed",
+    "input_scale_u": "true over told turn rate",
 }
 
 
@@ -61,6 +69,7 @@ def command(
     else:
         found = calibration_of(read_log(log), follower, from_s, to_s)
     _say_timing(found)
+    _say_odometry(found.odometry)
     if found.offsets is not None:
         _say_offsets(log, found.offsets)
     _say_mounts(found.mounts)
@@ -77,6 +86,12 @@ def _say_mounts(found: Mounts) -> None:
         return
     click.echo(said("leader", found.leader), err=True)
     click.echo(said("follower", found.follower), err=True)
+    if None in (found.follower.x, found.follower.y, found.follower.yaw):
+        click.echo(
+            "what is not told takes half a minute with left and right turns; a follower that was stopped for "
+            'its mount drives that with what is put in now, or with controller.mount_check = "warn"',
+            err=True,
+        )
     click.echo("put into the scenario:", err=True)
     for key, mount in found.settings.items():
         section, _, name = key.partition(".")
@@ -104,6 +119,15 @@ def _say_timing(found: Calibration) -> None:
     if found.settings:
         options = " ".join(f"--set {key}={value:.4f}" for key, value in found.settings.items())
         click.echo(f"run next with: {options}", err=True)
+
+
+def _say_odometry(found: Mapping[str, Known | None]) -> None:
+    """Print what the motion makes of odometry."""
+    for name, known in found.items():
+        if known is not None:
+            click.echo(
+                f"{name:21} {known.value:+.4f} give or take {known.sd:.4f}: {_RESPONSES[name]}", err=True
+            )
 
 
 def _say_offsets(log: Path, found: SensorBias) -> None:

@@ -28,6 +28,7 @@ class OdometryFaultKind(IntEnum):
     DELAY = 5
     SLIP = 6
     RESET = 7
+    COMMANDS = 8
 
 
 SILENT = OdometryFaultKind.SILENT.value
@@ -38,6 +39,7 @@ SCALE = OdometryFaultKind.SCALE.value
 DELAY = OdometryFaultKind.DELAY.value
 SLIP = OdometryFaultKind.SLIP.value
 RESET = OdometryFaultKind.RESET.value
+COMMANDS = OdometryFaultKind.COMMANDS.value
 
 
 class OdometryFault(NamedTuple):
@@ -87,12 +89,12 @@ def odometry_fault_rows(sections: Sequence[OdometryFaultSection]) -> Rows[Odomet
 
 @kernel(inline=False)
 def faulty_twist(
-    faults: Rows[OdometryFault], t: float, period: float, moves: Motion, told: Motion
+    faults: Rows[OdometryFault], t: float, period: float, moves: Motion, told: Motion, commanded: Motion
 ) -> OdometryTwist:
     """What becomes of a sample at t [s] that would have told a motion, under all faults in their order.
 
     ``moves``: how it truly moves, on which slip depends. ``period`` [s]: from sample to sample; a reset
-    happens at one of them.
+    happens at one of them. ``commanded``: what the robot was told to drive.
     """
     v, u, wheels_v, wheels_u = told.v, told.u, 1.0, 1.0
     silent, resets, delay = False, False, 0.0
@@ -107,6 +109,9 @@ def faulty_twist(
         elif fault.kind == ZERO:
             # As from robots whose driver leaves the twist empty: the pose is right.
             v, u = 0.0, 0.0
+        elif fault.kind == COMMANDS:
+            # As from robots whose driver repeats what it was told: the pose is right here, too.
+            v, u = commanded.v, commanded.u
         elif fault.kind == DELAY:
             delay = delay + fault.delay
         elif fault.kind == RESET:

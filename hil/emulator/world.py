@@ -270,7 +270,7 @@ def sampled(world: World, lab: Lab, memory: Memory, slot: int) -> World:
     delay, t = error.delay, -1.0
     if size(memory.odometry_faults) > 0 and world.motion_since_ns >= 0:
         t = (at_ns - world.motion_since_ns) * _NS
-        delay = delay + _told(memory, lab, STANDSTILL, STANDSTILL, t).delay
+        delay = delay + _told(memory, lab, load(Robot, memory.robots, 0), STANDSTILL, t).delay
     arrives_ns = at_ns + whole_ns(delay)
     for k in range(robots):
         robot = load(Robot, memory.robots, k)
@@ -281,7 +281,7 @@ def sampled(world: World, lab: Lab, memory: Memory, slot: int) -> World:
             error.scale_u * robot.motion.u + moving * error.sigma_u * normal.u,
         )
         # Faults are those of followers: nobody drives by the leader's odometry.
-        told = _told(memory, lab, robot.motion, measured, t if k > 0 else -1.0)
+        told = _told(memory, lab, robot, measured, t if k > 0 else -1.0)
         wheels = Motion(error.scale_v * told.wheels.v, error.scale_u * told.wheels.u)
         last = load(Reckoning, memory.reckoned, k)
         here = reckoned(last, pose_of(robot), wheels, told.resets)
@@ -297,11 +297,12 @@ def sampled(world: World, lab: Lab, memory: Memory, slot: int) -> World:
 
 
 @kernel
-def _told(memory: Memory, lab: Lab, moves: Motion, measured: Motion, t: float) -> OdometryTwist:
-    """What becomes of a measured motion t [s] after the leader set off; all is well before."""
+def _told(memory: Memory, lab: Lab, robot: Robot, measured: Motion, t: float) -> OdometryTwist:
+    """What becomes of a robot's measured motion t [s] after the leader set off; all is well before."""
     if t < 0.0:
         return OdometryTwist(measured, Motion(1.0, 1.0), False, False, 0.0)
-    return faulty_twist(memory.odometry_faults, t, 1.0 / lab.odometry_rate, moves, measured)
+    period = 1.0 / lab.odometry_rate
+    return faulty_twist(memory.odometry_faults, t, period, robot.motion, measured, robot.goal)
 
 
 @kernel
@@ -336,23 +337,21 @@ def _led(world: World, lab: Lab, memory: Memory) -> World:
 @kernel
 def _shown(world: World, lab: Lab, memory: Memory, number: int) -> bool:
     """Put into ``shown`` what the motion capture shows now, faults included; False for no frame at all."""
-    pair = Pair(_observed(memory, lab, number, 0), _observed(memory, lab, number, 1))
-    if size(memory.faults) > 0 and world.motion_since_ns >= 0:
-        t, last = (world.time_ns - world.motion_since_ns) * _NS, pair
-        if world.shown:
-            last = Pair(load(Pose, memory.shown, 0), load(Pose, memory.shown, 1))
-        shown = faulty(memory.faults, t, 1.0 / lab.mocap_rate, pair, last)
-        if shown.lost:
-            return False
-        pair = shown.pair
+    last = Pair(load(Pose, memory.shown, 0), load(Pose, memory.shown, 1))
+    for k in range(size(memory.robots)):
+        store(memory.shown, k, _observed(memory, lab, number, k))
+    if size(memory.faults) == 0 or world.motion_since_ns < 0:
+        return True
+    t = (world.time_ns - world.motion_since_ns) * _NS
+    pair = Pair(load(Pose, memory.shown, 0), load(Pose, memory.shown, 1))
+    shown = faulty(memory.faults, t, 1.0 / lab.mocap_rate, pair, last if world.shown else pair)
+    pair = last if shown.lost else shown.pair
     store(memory.shown, 0, pair.leader)
     store(memory.shown, 1, pair.follower)
-    for k in range(2, size(memory.robots)):
-        store(memory.shown, k, _observed(memory, lab, number, k))
-    return True
+    return not shown.lost
 
 
-@kernel(inline=False)
+@kernel
 def _observed(memory: Memory, lab: Lab, number: int, k: int) -> Pose:
     robots, mount = size(memory.robots), lab.follower_mount if k > 0 else lab.leader_mount
     row = (number % size(memory.shares)) * robots + k

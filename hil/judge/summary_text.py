@@ -187,6 +187,8 @@ def _clock_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
         parts = []
         if "delay_s" in own:
             parts.append(f"moves {round(1e3 * own['delay_s'])} ms after odometry")
+        if own.get("time_constant_s"):
+            parts.append(f"answers it with a lag of {round(1e3 * own['time_constant_s'])} ms")
         for name, what in (("scale_v", "speed"), ("scale_u", "turn rate")):
             if name in own:
                 parts.append(f"{what} {own[name]:.3f} of odometry's")

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controllers.follower import Command
-from estimation.consistency.process_estimate import MEMBERS, Member
+from estimation.consistency.filter_bank import Member
+from estimation.consistency.slip_estimate import BANK
 from estimation.own_motion.odometry_check import WayEntry
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.own_motion.own_track import OwnPoint
@@ -148,7 +149,7 @@ def tracks_of(rooms: Rooms, share: Share, k: int) -> Tracks:
         part(MotionSample, rooms.history, k * share.history, share.history),
         part(OwnPoint, rooms.own, k * share.own, share.own),
         part(WayEntry, rooms.ways, k * share.ways, share.ways),
-        part(Member, rooms.bank, k * MEMBERS, MEMBERS),
+        part(Member, rooms.bank, k * BANK, BANK),
     )
 
 

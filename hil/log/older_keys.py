@@ -23,6 +23,9 @@ BEFORE: dict[str, Any] = {
     "robot.odometry_faults": [],
     "estimator.own_motion": "odometry",
     "estimator.process_noise": "given",
+    "estimator.input_time_constant_s": 0.0,
+    "estimator.input_scale_v": 1.0,
+    "estimator.input_scale_u": 1.0,
 }
 """Value of ``section.key`` for logs without it; a test asks for every key that a reference log lacks."""
 

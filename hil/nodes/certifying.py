@@ -83,6 +83,12 @@ def _refuse_coarse(scenario: Scenario, A: float) -> None:
             f"estimator.certify: estimator.input_lag_s is {given.input_lag_s:g}, expected 0: commands that "
             f"stand in for odometry tell motion within no bound; {instead}"
         )
+    if given.input_time_constant_s > 0.0 or (given.input_scale_v, given.input_scale_u) != (1.0, 1.0):
+        raise UsageError(
+            f"estimator.certify: estimator.input_time_constant_s is {given.input_time_constant_s:g} and the "
+            f"scales {given.input_scale_v:g} and {given.input_scale_u:g}, expected 0, 1 and 1: odometry that "
+            f"has to be put right tells motion within no bound; {instead}"
+        )
     error = velocity_error(_errors(scenario), A, rho, scenario.controller.v_max)
     if error >= leader.k_v:
         raise UsageError(

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controllers.guard import CLOCK_TOLERANCE_NS
+from estimation.consistency.filter_bank import Member
 from estimation.consistency.noise_estimate import NOISE_AS_TOLD, kept_noise
-from estimation.consistency.process_estimate import NOTHING_LEARNED, Member
+from estimation.consistency.process_estimate import NOTHING_LEARNED
+from estimation.consistency.slip_estimate import SLIP_AS_TOLD
 from estimation.models.measurement import PairSeen
 from estimation.own_motion.odometry_check import UNCHECKED, OdometrySample, WayEntry, without_track
 from estimation.own_motion.odometry_history import IDEAL, MotionSample
@@ -135,6 +137,8 @@ NOTHING_KNOWN = Known(
     travel=NO_TRAVEL,
     mount_check=NO_MOUNT_CHECK,
     odometry_noise=ODOMETRY_AS_TOLD,
+    slip=SLIP_AS_TOLD,
+    answer=MotionSample(0, 0.0, 0.0),
 )
 
 

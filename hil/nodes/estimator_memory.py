@@ -12,10 +12,17 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.consistency.process_estimate import MEMBERS, Member
+from estimation.consistency.filter_bank import Member
+from estimation.consistency.slip_estimate import BANK
 from estimation.filters.filter import Filter
 from estimation.own_motion.odometry_check import OdometrySample, WayEntry
-from estimation.own_motion.odometry_history import Correction, History, MotionSample
+from estimation.own_motion.odometry_history import (
+    Correction,
+    History,
+    MotionSample,
+    answer_again,
+    time_constant_of,
+)
 from estimation.own_motion.own_track import OwnPoint
 from estimation.time.host_time import TimeRows, time_rows
 from estimation.tracking.estimate import Estimate
@@ -44,6 +51,7 @@ from hil.nodes.node import Counts
 from hil.nodes.refusals import COUNTED, REFUSALS, TAKEN, TAKEN_FRAME
 from hil.nodes.status_reasons import ALL_REASONS
 from hil.scenario.leader_model import (
+    finds_slip,
     follower_mount,
     input_trust,
     leader_filter,
@@ -96,6 +104,7 @@ def rules_of(scenario: Scenario) -> Rules:
         own_noise=own_noise(scenario),
         noise_learning=noise_learning(scenario),
         process_learning=process_learning(scenario),
+        learns_slip=finds_slip(scenario),
         mounts=MountRules(follower_mount(scenario), scenario.controller.mount_check == "stop"),
     )
 
@@ -146,7 +155,7 @@ class EstimatorMemory:
             history=rows_of(MotionSample, room_for(rules.step.span)),
             own=rows_of(OwnPoint, room),
             ways=rows_of(WayEntry, WAYS),
-            bank=rows_of(Member, MEMBERS),
+            bank=rows_of(Member, BANK),
             known=row_of(NOTHING_KNOWN),
             time=time_rows(),
             notes=row_of(NOTHING_NOTED),
@@ -232,7 +241,11 @@ class EstimatorMemory:
 
     def correct(self, correction: Correction) -> None:
         """Correct odometry so from now on."""
-        store(self.desk.known, 0, self.known._replace(correction=correction))
+        known, trust = self.known, self.rules.step.trust
+        time_constant = time_constant_of(trust, correction)
+        if time_constant not in (0.0, time_constant_of(trust, known.correction)):
+            answer_again(self.desk.history, known.odometry, 0, time_constant)
+        store(self.desk.known, 0, known._replace(correction=correction))
 
     @property
     def known(self) -> Known:
@@ -273,6 +286,12 @@ class EstimatorMemory:
     def history(self) -> History:
         """Odometry, oldest first."""
         return tuple(_held(MotionSample, self.desk.history, self.known.odometry))
+
+    @property
+    def ways(self) -> tuple[WayEntry, ...]:
+        """Ways of odometry and the follower's own track, oldest first, where both are known."""
+        check = self.known.odometry_check
+        return tuple(_held(WayEntry, self.desk.ways, check.entries)[: check.paired])
 
     @property
     def receipts(self) -> tuple[Receipt, ...]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from estimation.consistency.filter_bank import Member
 from estimation.consistency.noise_estimate import NOISE_GIVEN, NoiseEstimate, NoiseLearning
-from estimation.consistency.process_estimate import LearnedProcess, Member, ProcessLearning
+from estimation.consistency.process_estimate import LearnedProcess, ProcessLearning
+from estimation.consistency.slip_estimate import LearnedSlip
 from estimation.filters.filter import Filter
 from estimation.models.measurement import PoseNoise
 from estimation.own_motion.odometry_check import OdometryCheck, WayEntry
@@ -40,7 +42,8 @@ class Rules(NamedTuple):
 
     source: where the follower's motion is from. reprocesses: whether odometry that comes late is folded in
     again. span: seconds of odometry kept. noise: of a mocap pose. mounts: of the follower's
-    body. noise_learning: by what the noise is put right.
+    body. noise_learning: by what the noise is put right. learns_slip: whether what the follower's motion is
+    worth is found from sightings.
     """
 
     settings: TrackSettings
@@ -54,13 +57,14 @@ class Rules(NamedTuple):
     process_learning: ProcessLearning
     mounts: MountRules = NO_MOUNT_RULES
     noise_learning: NoiseLearning = NOISE_GIVEN
+    learns_slip: bool = False
 
 
 class Memory(NamedTuple):
     """Rows that an estimator works in: the leader's track, odometry, the follower's own track, and more.
 
-    By the ``ways`` that both have gone odometry is judged. ``bank``: filters of other process noise, by which
-    that is found.
+    By the ``ways`` that both have gone odometry is judged. ``bank``: filters of other process noise and of
+    other slip, by which these are found.
     """
 
     points: Rows[TrackPoint]
@@ -76,7 +80,8 @@ class Known(NamedTuple):
     ``watched_ns``: capture of the first frame since when odometry is missed, 0 before. ``noise``: of
     measurements, as they tell it. ``process``: what is known of how the leader drives. ``travel``: which
     way the leader went, where it is seen in the world. ``mount_check``: what is left of the follower's mount.
-    ``odometry_noise``: what odometry shows to be its errors.
+    ``odometry_noise``: what odometry shows to be its errors. ``slip``: what of them sightings show.
+    ``answer``: of a lag to its newest sample.
     """
 
     track: Ring
@@ -90,12 +95,13 @@ class Known(NamedTuple):
     travel: TravelWatch
     mount_check: MountCheck
     odometry_noise: OdometryNoise
+    slip: LearnedSlip
+    answer: MotionSample
 
 
 class Taken(NamedTuple):
     """What became of a frame or sighting: verdict and cause; ``late``: captured before the newest."""
 
-    known: Known
     verdict: int
     cause: int
     late: bool

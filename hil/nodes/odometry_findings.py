@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from estimation.own_motion.odometry_check import POSE, TRACK, OdometryCheck, Sums, source_of
+from estimation.own_motion.odometry_check import POSE, TRACK, OdometryCheck, Sums
 from hil.nodes.estimator_records import AUTO, Known, Rules
+from hil.nodes.own_motion_step import source_now
 
 FINDING = "finding."
 """What the names of findings begin with among the values of a node's diagnostics."""
@@ -40,9 +41,9 @@ def odometry_findings(known: Known, rules: Rules, now_ns: int) -> dict[str, str]
         return found
     if check.late != 0.0:
         way = "late" if check.late > 0.0 else "ahead of the motion, as commands are,"
-        found["odometry_late"] = f"odometry is {way} by {abs(check.late):.2f} s{_instead(known)}"
+        found["odometry_late"] = f"odometry is {way} by {abs(check.late):.2f} s{_instead(known, rules)}"
     elif not check.by_twist.trusted:
-        found["odometry_contradicts"] = f"odometry tells {_contradiction(check)}{_instead(known)}"
+        found["odometry_contradicts"] = f"odometry tells {_contradiction(check)}{_instead(known, rules)}"
     if check.resets and (now_ns - check.reset_ns) * _NS < _REMEMBERED_S:
         found["odometry_reset"] = f"the pose of odometry has jumped {check.resets} times; its twist goes on"
     return found
@@ -52,9 +53,9 @@ def _rate(check: OdometryCheck) -> str:
     return f", {1.0 / check.period:.3g} a second before" if check.period > 0.0 else ""
 
 
-def _instead(known: Known) -> str:
+def _instead(known: Known, rules: Rules) -> str:
     """What the motion is taken from instead."""
-    source = source_of(known.odometry_check)
+    source = source_now(known, rules)
     if source == POSE:
         return "; its pose is right and taken instead"
     if known.own.length == 0:

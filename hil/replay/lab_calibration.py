@@ -16,6 +16,7 @@ from hil.replay.calibration import calibrate
 from hil.replay.foreign_log import foreign_events
 from hil.replay.mount_calibration import Mounts, mounts_of_events, mounts_of_log
 from hil.replay.noise_calibration import noise_of_log
+from hil.replay.odometry_alignment import odometry_response
 from hil.replay.timing import VAGUE, Timing, timing_of
 from hil.replay.topic_map import TopicMap
 from hil.scenario.files import with_overrides
@@ -33,6 +34,7 @@ class Calibration:
     something of it is not known, a line each. ``uncertain``: that the correction is too uncertain to be set.
     ``settings``: scenario keys that put it right. ``offsets``: of a range and bearing sensor, ``range`` [m]
     and ``bearing`` [rad], each with ``offset``, ``sd`` and ``spread``; None without sightings.
+    ``odometry``: what the motion makes of odometry, by the estimator's keys, None for what is not told.
     ``mounts``: where the bodies of leader and follower sit on their robots. ``noise``: standard deviations of
     measurements by the estimator's keys for them.
 
@@ -51,6 +53,7 @@ class Calibration:
     offsets: SensorBias | None
     mounts: Mounts
     noise: Mapping[str, float]
+    odometry: Mapping[str, Known | None]
 
     def as_dict(self) -> dict[str, Any]:
         """The JSON of ``abreast calibrate``."""
@@ -66,7 +69,10 @@ class Calibration:
         if self.noise:
             result["noise"] = dict(self.noise)
         cleaned: dict[str, Any] = known(result)
-        # In mounts null stands for what the motion does not tell.
+        # In these null stands for what the motion does not tell.
+        if any(self.odometry.values()):
+            told = {key: found and found.value for key, found in self.odometry.items()}
+            cleaned["odometry"] = told | {"sd": [found and found.sd for found in self.odometry.values()]}
         return cleaned | {"mounts": self.mounts.as_dict()}
 
 
@@ -98,6 +104,7 @@ def calibration_of(
         offsets=offsets,
         mounts=mounts,
         noise=noise_of_log(log, scenario, offsets, from_s, to_s),
+        odometry=odometry_response(timing.alignment),
     )
 
 
@@ -110,7 +117,7 @@ def calibration_of_foreign(
     """
     mounts = mounts_of_events(foreign_events(log, chart), chart.scenario, from_s, to_s)
     unknown = "timing and sensor offsets: looked for in logs of abreast only; turn this one into one"
-    return Calibration({}, (unknown,), False, {}, None, mounts, {})
+    return Calibration({}, (unknown,), False, {}, None, mounts, {}, {})
 
 
 def _scenario_of(log: Log, follower: str | None) -> Scenario:

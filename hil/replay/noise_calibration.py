@@ -8,6 +8,8 @@ import numpy as np
 
 from estimation.calibration.measured_noise import odometry_scatter, pose_scatter
 from estimation.calibration.sensor_bias import SensorBias
+from estimation.own_motion.input_alignment import Alignment
+from estimation.own_motion.lagged_signal import LaggedSignal, columns_of
 from formation.angles import FloatArray
 from hil.log.events import logged_events
 from hil.log.metadata import IMPORT, mode_of
@@ -67,14 +69,23 @@ def _of_poses(tracks: BodyTracks, span_ns: tuple[int, int], least_speed: float) 
 
 
 def _of_odometry(record: OwnRecord, span_ns: tuple[int, int]) -> dict[str, float | None]:
-    delay = own_alignment(record).delay
-    shift_ns = 0 if delay is None else round(delay.value * 1e9)
+    found = own_alignment(record)
+    shift_ns = 0 if found.delay is None else round(found.delay.value * 1e9)
     seen = sorted(at_ns for at_ns in record.poses if span_ns[0] <= at_ns <= span_ns[1])
     told = sorted(at_ns for at_ns in record.motions if span_ns[0] <= at_ns <= span_ns[1])
     scatter = odometry_scatter(
         np.array(seen, dtype=np.int64),
         np.array([record.poses[at_ns] for at_ns in seen]).reshape(-1, 3),
         np.array(told, dtype=np.int64) + shift_ns,
-        np.array([record.motions[at_ns] for at_ns in told]).reshape(-1, 2),
+        _answers(np.array(told) * 1e-9, [record.motions[at_ns] for at_ns in told], found),
     )
     return {} if scatter is None else {"sigma_v2": scatter[0], "sigma_u2": scatter[1]}
+
+
+def _answers(times: FloatArray, motions: list[tuple[float, float]], found: Alignment) -> FloatArray:
+    """Odometry as the motion answers it, if with a lag."""
+    told: FloatArray = np.array(motions).reshape(-1, 2)
+    if found.lag is None or found.lag.value == 0.0 or len(told) < 2:
+        return told
+    signal = LaggedSignal(times - times[0], told[:, 0] + 1j * told[:, 1], held=False)
+    return columns_of(signal.states(found.lag.value))

@@ -1,4 +1,4 @@
-"""How the follower's odometry compares with its own mocap track: its delay and its scales."""
+"""How the follower's odometry compares with its own mocap track: its delay, its lag and its scales."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.own_motion.input_alignment import UNKNOWN, Alignment, align_odometry
+from estimation.own_motion.input_alignment import UNKNOWN, Alignment, Known, align_odometry
+from estimation.own_motion.odometry_correction import LEAST_LAG, LEAST_SCALE, SDS_LEFT, is_surely_off
 from estimation.time.host_time import NO_TIME_YET, time_rows
 from formation.angles import FloatArray
 from formation.mount import robot_pose
@@ -72,6 +73,44 @@ def own_alignment(record: OwnRecord) -> Alignment:
     )
 
 
+def odometry_response(found: Alignment) -> dict[str, Known | None]:
+    """What the motion makes of odometry, by the estimator's keys for it; None for what is not told."""
+    return {
+        "input_delay_s": found.delay,
+        "input_time_constant_s": found.lag,
+        "input_scale_v": found.scale_v,
+        "input_scale_u": found.scale_u,
+    }
+
+
+def response_settings(found: Alignment, scenario: Scenario) -> dict[str, float]:
+    """Keys of the estimator that put odometry right, where they are surely not as the scenario has them.
+
+    Of commands that stand in for odometry also their delay, and how much later than that motion may come: as
+    delay and lag together are uncertain. Any other delay is one of stamps.
+    """
+    given, wanted = scenario.estimator, odometry_response(found)
+    settings: dict[str, float] = {}
+    if (
+        given.input_lag_s > 0.0
+        and found.delay is not None
+        and found.late is not None
+        and found.lag is not None
+    ):
+        settings["input_delay_s"] = max(0.0, found.delay.value)
+        settings["input_lag_s"] = SDS_LEFT * found.late.sd
+        settings["input_time_constant_s"] = found.lag.value
+    for key, least in (
+        ("input_time_constant_s", LEAST_LAG),
+        ("input_scale_v", LEAST_SCALE),
+        ("input_scale_u", LEAST_SCALE),
+    ):
+        known = wanted[key]
+        if known is not None and is_surely_off(known, getattr(given, key), least):
+            settings[key] = known.value
+    return {f"estimator.{key}": value for key, value in settings.items()}
+
+
 def _aligned(seen_ns: Stamps, poses: FloatArray, odometry_ns: Stamps, motions: FloatArray) -> Alignment:
     if not (len(seen_ns) and len(odometry_ns)):
         return UNKNOWN
@@ -94,10 +133,11 @@ def judge_kept_motion(kept: Kept) -> dict[str, float]:
 
 
 def judge_own_motion(log: Log, scenario: Scenario) -> dict[str, float]:
-    """The ``own_motion`` part of a summary: delay_s, scale_v and scale_u, each with its standard deviation.
+    """The ``own_motion`` part of a summary: delay_s, time_constant_s, scale_v and scale_u, each with its sd.
 
-    ``delay_s`` is by how much the robot's motion comes later than odometry says; the true motion is the scale
-    times odometry. What the log does not let know is absent: there may be no mocap, or hardly any motion.
+    ``delay_s`` is by how much the robot's motion comes later than odometry says, ``time_constant_s`` that of
+    a lag with which it answers; the true motion is the scale times what these make of odometry. What the log
+    does not let know is absent: there may be no mocap, or hardly any motion.
     """
     if not {topics.RIGID_BODIES, topics_of(scenario).odom} <= set(log.topics):
         return {}
@@ -106,7 +146,13 @@ def judge_own_motion(log: Log, scenario: Scenario) -> dict[str, float]:
 
 def _figures(found: Alignment) -> dict[str, float]:
     result: dict[str, float] = {}
-    for name, known in (("delay_s", found.delay), ("scale_v", found.scale_v), ("scale_u", found.scale_u)):
+    named = (
+        ("delay_s", found.delay),
+        ("time_constant_s", found.lag),
+        ("scale_v", found.scale_v),
+        ("scale_u", found.scale_u),
+    )
+    for name, known in named:
         if known is not None:
             result |= {name: known.value, f"{name}_sd": known.sd}
     return result

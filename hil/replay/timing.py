@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from estimation.calibration.actuator_response import ActuatorResponse, fit_response
-from estimation.own_motion.input_alignment import Known
+from estimation.own_motion.input_alignment import UNKNOWN, Alignment, Known
+from estimation.own_motion.odometry_correction import LEAST_LAG, is_surely_off
 from hil.log.events import logged_events
 from hil.log.metadata import IMPORT, mode_of
 from hil.log.reader import Log
-from hil.replay.odometry_alignment import OwnRecord, own_alignment, own_record
+from hil.replay.odometry_alignment import OwnRecord, own_alignment, own_record, response_settings
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -37,17 +39,19 @@ class Timing:
     """Timing of a follower as its log tells it; ``unknown``: why something is not known, a line each.
 
     ``response``: of its odometry, by the odometry's own stamps, to its commands. ``lateness`` [s]: by how
-    much its mocap track, as the scenario of the log times it, comes after its odometry.
+    much its mocap track, as the scenario of the log times it, comes after its odometry. ``alignment``: all
+    that the two tell of each other.
     """
 
     response: ActuatorResponse | None
     lateness: Known | None
     unknown: tuple[str, ...] = ()
+    alignment: Alignment = UNKNOWN
 
     @property
     def known(self) -> bool:
         """Whether the log tells anything."""
-        return self.response is not None or self.lateness is not None
+        return self.response is not None or self.alignment.late is not None or self.lateness is not None
 
     def keys(self, scenario: Scenario) -> dict[str, Known]:
         """What is known by its name: lag_s, transport_s, their sum delay_s, and the correction of stamps.
@@ -57,12 +61,16 @@ class Timing:
         """
         found: dict[str, Known] = {}
         if self.response is not None:
-            known = self.response
+            known, answers = self.response, self.alignment.lag
             shift = scenario.estimator.input_delay_s
+            # Odometry that tells commands has answered them already, and the robot answers odometry.
+            later = (
+                answers if is_surely_off(answers, 0.0, LEAST_LAG) and answers is not None else Known(0.0, 0.0)
+            )
             found |= {
-                "lag_s": known.lag,
+                "lag_s": _sum(known.lag, later),
                 "transport_s": Known(known.transport.value + shift, known.transport.sd),
-                "delay_s": Known(known.delay.value + shift, known.delay.sd),
+                "delay_s": _sum(Known(known.delay.value + shift, known.delay.sd), later),
             }
         if self.lateness is not None:
             name, before = _correction(scenario)
@@ -93,7 +101,12 @@ class Timing:
         if sure or early:
             late = (found[name].value if sure else before) - early
             given[f"estimator.{name}"] = max(0.0, late) if name == "transport_latency_s" else late
+        given |= response_settings(self.alignment, scenario)
         return {key: round(value, 4) + 0.0 for key, value in given.items()}
+
+
+def _sum(a: Known, b: Known) -> Known:
+    return Known(a.value + b.value, math.hypot(a.sd, b.sd))
 
 
 def _correction(scenario: Scenario) -> tuple[str, float]:
@@ -120,9 +133,10 @@ def timing_of(log: Log, scenario: Scenario, from_s: float | None = None, to_s: f
         {at_ns: pose for at_ns, pose in record.poses.items() if begin_ns <= at_ns <= end_ns},
         {at_ns: motion for at_ns, motion in record.motions.items() if begin_ns <= at_ns <= end_ns},
     )
-    lateness = own_alignment(span).delay
+    alignment = own_alignment(span)
+    lateness = alignment.delay
     if given.input_lag_s > 0.0:
-        return Timing(None, None, (_of_commands(given.input_lag_s, lateness),))
+        return Timing(None, None, (_of_commands(given.input_lag_s, alignment.late),), alignment)
     unknown: list[str] = []
     commands = _commands(log, names)
     response = _response(commands, span.motions)
@@ -142,7 +156,7 @@ def timing_of(log: Log, scenario: Scenario, from_s: float | None = None, to_s: f
             f"offset of stamps unknown: odometry and mocap of {names.follower!r} tell too little, drive for "
             "10 s or longer, with turns and changes of speed"
         )
-    return Timing(response, lateness, tuple(unknown))
+    return Timing(response, lateness, tuple(unknown), alignment)
 
 
 def _of_commands(lag: float, lateness: Known | None) -> str:

@@ -144,6 +144,13 @@ def noise_learning(scenario: Scenario) -> NoiseLearning:
     return NoiseLearning(learns, told, float(scenario.leader.v_eps))
 
 
+def finds_slip(scenario: Scenario) -> bool:
+    """Whether what odometry is worth is found by what is seen from on board; only filters as records can."""
+    given = scenario.estimator
+    records = given.kind in ("ekf", "ukf") and not given.bias_states
+    return given.front_end == "body" and given.noise == "estimated" and records
+
+
 def own_noise(scenario: Scenario) -> OwnNoise:
     """What is known of the follower by its own mocap track."""
     limits = scenario.controller
@@ -162,5 +169,8 @@ def input_trust(scenario: Scenario) -> InputTrust:
         limits.u_max,
         given.slip_v2 if given.front_end == "body" else 0.0,
         given.slip_u2 if given.front_end == "body" else 0.0,
+        given.input_time_constant_s,
+        given.input_scale_v,
+        given.input_scale_u,
     )
     return InputTrust(*map(float, numbers))

@@ -162,11 +162,12 @@ class OdometryFaultSection(_Section, frozen=True, kw_only=True):
 
     ``silent``: no samples; ``nan``: a twist of NaN; ``zero``: a twist of 0 with a right pose; ``reversed``:
     both with the opposite sign; ``scale``: both times ``factor``; ``delay``: samples come, and are stamped,
-    ``delay_s`` later; ``slip``: the share ``factor`` |u2| (u2 in rad/s, at most 0.9) of what the wheels turn
-    is lost; ``reset``: the pose begins anew at its origin, once. ``duration_s`` 0 stands for good.
+    ``delay_s`` later; ``commands``: the twist tells what the robot was told to drive; ``slip``: the share
+    ``factor`` |u2| (u2 in rad/s, at most 0.9) of what the wheels turn is lost; ``reset``: the pose begins
+    anew at its origin, once. ``duration_s`` 0 stands for good.
     """
 
-    kind: Literal["silent", "nan", "zero", "reversed", "scale", "delay", "slip", "reset"]
+    kind: Literal["silent", "nan", "zero", "reversed", "scale", "delay", "slip", "reset", "commands"]
     at_s: NonNegative
     duration_s: NonNegative = 0.0
     factor: float = 0.5
@@ -239,8 +240,9 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     """The estimator: which one, what it measures with, and its noise by rule.
 
     ``front_end`` world: leader position and follower pose from mocap; body: range and bearing of the leader
-    and the follower's own motion, taken as noisy. Where commands stand in for odometry the motion comes
-    ``input_delay_s`` after its signal, and up to ``input_lag_s`` later still.
+    and the follower's own motion, taken as noisy. The motion is ``input_scale_v`` and ``input_scale_u`` times
+    what a first-order lag of ``input_time_constant_s`` makes of its signal ``input_delay_s`` before; where
+    commands stand in for odometry, up to ``input_lag_s`` later still.
     ``own_motion``: where v2 and u2 come from: odometry, the follower's own mocap track, both fused, or auto:
     odometry while the track bears it out, else the track.
     ``sigma_range``, ``sigma_bearing``: of a body-frame sensor; for mocap they follow from the geometry.
@@ -259,7 +261,8 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     for those that stop and go every few seconds).
     ``process_noise``: estimated finds both bandwidths by what is seen of the leader, from the given ones on,
     and notices steps of its speed and turn rate (``ekf``, ``ukf``); given takes them as they are.
-    ``align_odometry``: odometry is corrected by the delay and scales that the follower's mocap track shows.
+    ``align_odometry``: odometry is corrected by the delay, lag and scales that the follower's mocap track
+    shows.
     ``slip_v2``, ``slip_u2``: share of v2 and u2 by which slip may falsify odometry; on the body front end.
     ``settled_heading``: standard deviation [rad] of the leader's direction from which on a track is trusted
     with it, until it is 0.25 rad above that; 0 for what suits the estimator (0.35 for most).
@@ -291,6 +294,9 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     sigma_u2: Positive = 0.03
     input_delay_s: NonNegative = 0.0
     input_lag_s: NonNegative = 0.0
+    input_time_constant_s: NonNegative = 0.0
+    input_scale_v: Positive = 1.0
+    input_scale_u: Positive = 1.0
     slip_v2: NonNegative = 0.1
     slip_u2: NonNegative = 0.1
     settled_heading: NonNegative = 0.0

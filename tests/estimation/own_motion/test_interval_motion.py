@@ -7,7 +7,14 @@ import pytest
 
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.own_motion.interval_motion import LASTING, motion_between, travelled
-from estimation.own_motion.odometry_history import IDEAL, Correction, InputTrust, MotionSample
+from estimation.own_motion.odometry_history import (
+    IDEAL,
+    Correction,
+    InputTrust,
+    MotionSample,
+    answer_again,
+    answer_at,
+)
 from estimation.own_motion.own_track import ODOMETRY_CORRELATION
 from formation.records import Rows, rows_of, store
 from formation.ring import EMPTY, Ring
@@ -83,3 +90,15 @@ def test_who_was_never_heard_stands_give_or_take_its_limits() -> None:
     limited = InputTrust(0.005, 0.03, v_max=0.2, u_max=0.01)
     found = motion_between(rows_of(MotionSample, 4), EMPTY, (0, MS), limited, IDEAL)
     assert found == FollowerMotion(0.0, 0.0, 0.2, 0.03)
+
+
+def test_the_way_of_a_lags_answer_is_its_integral() -> None:
+    rows, ring = kept(turn_in_between())
+    answer_again(rows, ring, 0, 0.15)
+    trust = InputTrust(0.005, 0.03, time_constant=0.15, scale_u=0.9)
+    found = motion_between(rows, ring, (313 * MS, 988 * MS), trust, IDEAL)
+    steps = 4000
+    middles = [313 * MS + round((k + 0.5) * 675 * MS / steps) for k in range(steps)]
+    mean = sum(answer_at(rows, ring, at_ns, 0.15).u2 for at_ns in middles) / steps
+    assert found.u2 == pytest.approx(0.9 * mean, abs=1e-6)
+    assert found.v2 == pytest.approx(0.1)

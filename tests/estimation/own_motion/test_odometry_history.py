@@ -3,20 +3,26 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimation.models.coordinated_turn import FollowerMotion
+from estimation.own_motion.lagged_signal import LaggedSignal
 from estimation.own_motion.odometry_history import (
     IDEAL,
     Correction,
     InputTrust,
     MotionSample,
+    answer_again,
+    answer_at,
     follower_motion,
+    left_of,
     motion_at,
     remember,
     sample_at,
+    time_constant_of,
 )
 from formation.records import Rows, rows_of, store
 from formation.ring import EMPTY, Ring
@@ -129,3 +135,62 @@ def test_a_follower_that_never_spoke_stands_give_or_take_its_limits() -> None:
     assert motion_from([], 1000, TRUST) == FollowerMotion(0.0, 0.0, 0.005, 0.03)
     limited = InputTrust(0.005, 0.03, v_max=0.2, u_max=0.01)
     assert motion_from([], 1000, limited) == FollowerMotion(0.0, 0.0, 0.2, 0.03)
+
+
+TIME_CONSTANT = 0.15
+
+
+def answered_history(samples: Sequence[MotionSample]) -> tuple[Rows[MotionSample], Ring]:
+    rows, ring = kept(samples)
+    answer_again(rows, ring, 0, TIME_CONSTANT)
+    return rows, ring
+
+
+def uneven() -> tuple[list[MotionSample], LaggedSignal]:
+    """Samples at uneven times, and the same for one who looks at all of them at once."""
+    stamps = [0, 40, 70, 170, 175, 300, 520, 560, 900, 1000]
+    samples = [MotionSample(ms * MS, math.sin(0.01 * ms), math.cos(0.02 * ms)) for ms in stamps]
+    told = np.array([complex(each.v2, each.u2) for each in samples])
+    return samples, LaggedSignal(np.array(stamps) * 1e-3, told, held=False)
+
+
+@given(st.integers(0, 1000 * MS))
+@settings(deadline=None)
+def test_the_answer_of_a_lag_is_exact_between_samples_of_any_spacing(stamp_ns: int) -> None:
+    samples, signal = uneven()
+    found = answer_at(*answered_history(samples), stamp_ns, TIME_CONSTANT)
+    (expected,) = signal.answers(np.array([stamp_ns * 1e-9]), TIME_CONSTANT, signal.states(TIME_CONSTANT))
+    assert complex(found.v2, found.u2) == pytest.approx(expected, abs=1e-12)
+
+
+def test_after_the_newest_sample_the_answer_goes_on_to_it() -> None:
+    rows, ring = answered_history([MotionSample(0, 0.0, 1.0), MotionSample(100 * MS, 0.2, -1.0)])
+    now, later = (answer_at(rows, ring, ms * MS, TIME_CONSTANT) for ms in (100, 250))
+    assert later.v2 == pytest.approx(0.2 + (now.v2 - 0.2) * math.exp(-1.0))
+    assert answer_at(rows, ring, 5000 * MS, TIME_CONSTANT).u2 == pytest.approx(-1.0)
+
+
+def test_a_sample_that_comes_late_changes_the_answers_after_it() -> None:
+    samples, _ = uneven()
+    whole, ring = answered_history(samples)
+    late = samples.pop(4)
+    rows, short = answered_history(samples)
+    short = remember(rows, short, late, 10.0)
+    answer_again(rows, short, late.stamp_ns, TIME_CONSTANT)
+    found = [sample_at(rows, short, k) for k in range(short.length)]
+    assert found == [sample_at(whole, ring, k) for k in range(ring.length)]
+
+
+def test_a_correction_takes_the_place_of_what_is_told_of_the_lag() -> None:
+    told = InputTrust(0.005, 0.03, lag=0.3, time_constant=0.2)
+    assert (time_constant_of(told, IDEAL), left_of(told, IDEAL)) == (0.2, 0.3)
+    found = Correction(time_constant=0.1, left=0.05)
+    assert (time_constant_of(told, found), left_of(told, found)) == (0.1, 0.05)
+    # Nothing makes a motion come later than it is told to at most.
+    assert left_of(told, Correction(left=0.4)) == 0.3
+    samples, _ = uneven()
+    rows, ring = answered_history(samples)
+    trust = InputTrust(0.005, 0.03, time_constant=TIME_CONSTANT, scale_v=2.0, scale_u=0.5)
+    at = answer_at(rows, ring, 500 * MS, TIME_CONSTANT)
+    motion = follower_motion(rows, ring, 500 * MS, trust, Correction(scale_v=1.5))
+    assert [motion.v2, motion.u2] == [pytest.approx(3.0 * at.v2), pytest.approx(0.5 * at.u2)]

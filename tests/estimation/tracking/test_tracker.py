@@ -23,7 +23,7 @@ from estimation.models.measurement import (
 from estimation.tracking.estimate import Estimate, estimate_at
 from estimation.tracking.follower_check import Cause
 from estimation.tracking.track import Track, Tracker
-from estimation.tracking.track_point import JumpUncertainty, TrackPoint, Verdict
+from estimation.tracking.track_point import SAME_NS, JumpUncertainty, TrackPoint, Verdict, with_motion
 from estimation.tracking.tracker import (
     Status,
     TrackSettings,
@@ -34,7 +34,6 @@ from estimation.tracking.tracker import (
     point_at,
     reprocessed,
     status_of,
-    with_motion,
 )
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
@@ -203,6 +202,10 @@ def test_the_order_of_arrival_within_the_window_does_not_matter_to_the_last_bit(
         assert (left.verdict, left.used_ns, left.settled) == (right.verdict, right.used_ns, right.settled)
 
 
+def at_nearly_the_same_time(measurement: Measurement, later_ns: int) -> Measurement:
+    return measurement._replace(capture_ns=measurement.capture_ns + later_ns)
+
+
 @pytest.mark.parametrize(("kind", "front_end"), CASES)
 def test_duplicates_and_too_late_ones_change_nothing_and_are_told_apart(
     kind: str, front_end: FrontEnd
@@ -213,6 +216,8 @@ def test_duplicates_and_too_late_ones_change_nothing_and_are_told_apart(
     for late, verdict in (
         (run.measurements[-1], Verdict.DUPLICATE),
         (run.measurements[-7], Verdict.DUPLICATE),
+        (at_nearly_the_same_time(run.measurements[-1], SAME_NS - 1), Verdict.DUPLICATE),
+        (at_nearly_the_same_time(run.measurements[-7], 1 - SAME_NS), Verdict.DUPLICATE),
         (run.measurements[20], Verdict.LATE),
         (run.measurements[0], Verdict.LATE),
     ):

@@ -24,7 +24,7 @@ from hil.scenario.schema import OdometryFaultSection
 from hil.scenario.start import chain_poses
 
 EPOCH_NS = 1_767_225_600_000_000_000
-MOVES, TOLD = Motion(0.1, 0.5), Motion(0.11, 0.52)
+MOVES, TOLD, WANTED = Motion(0.1, 0.5), Motion(0.11, 0.52), Motion(0.15, -0.4)
 PERIOD = 1.0 / 30.0
 
 
@@ -46,38 +46,45 @@ def test_the_words_of_scenarios_are_the_kinds() -> None:
         (section("slip", factor=0.4), TOLD.v / 0.8, TOLD.u / 0.8),
         (section("delay"), TOLD.v, TOLD.u),
         (section("reset"), TOLD.v, TOLD.u),
+        (section("commands"), WANTED.v, WANTED.u),
     ],
 )
 def test_each_fault_tells_what_its_name_says(fault: OdometryFaultSection, v: float, u: float) -> None:
     rows = odometry_fault_rows([fault])
-    before = faulty_twist(rows, 1.99, PERIOD, MOVES, TOLD)
+    before = faulty_twist(rows, 1.99, PERIOD, MOVES, TOLD, WANTED)
     assert before == (TOLD, Motion(1.0, 1.0), False, False, 0.0)
-    told = faulty_twist(rows, 2.0, PERIOD, MOVES, TOLD)
+    told = faulty_twist(rows, 2.0, PERIOD, MOVES, TOLD, WANTED)
     assert told.told == pytest.approx(Motion(v, u))
     assert told.delay == (0.2 if fault.kind == "delay" else 0.0)
     assert told.resets is (fault.kind == "reset")
     assert not told.silent
-    # A pose adds up what the wheels do, and no wheel does what an empty twist tells.
-    wheels = Motion(v / TOLD.v, u / TOLD.u) if fault.kind != "zero" else Motion(1.0, 1.0)
+    # A pose adds up what the wheels do, and no wheel does what an empty twist tells, or a wanted one.
+    by_wheels = fault.kind not in ("zero", "commands")
+    wheels = Motion(v / TOLD.v, u / TOLD.u) if by_wheels else Motion(1.0, 1.0)
     assert told.wheels == pytest.approx(wheels)
 
 
 def test_nan_and_silence() -> None:
-    nan = faulty_twist(odometry_fault_rows([section("nan")]), 3.0, PERIOD, MOVES, TOLD)
+    nan = faulty_twist(odometry_fault_rows([section("nan")]), 3.0, PERIOD, MOVES, TOLD, WANTED)
     assert math.isnan(nan.told.v)
     assert math.isnan(nan.told.u)
-    assert faulty_twist(odometry_fault_rows([section("silent")]), 3.0, PERIOD, MOVES, TOLD).silent
+    assert faulty_twist(odometry_fault_rows([section("silent")]), 3.0, PERIOD, MOVES, TOLD, WANTED).silent
 
 
 def test_a_fault_lasts_as_long_as_it_says_and_without_that_for_good() -> None:
     rows = odometry_fault_rows([section("zero", duration_s=1.0)])
-    assert [faulty_twist(rows, t, PERIOD, MOVES, TOLD).told.v == 0.0 for t in (2.9, 3.0)] == [True, False]
-    assert faulty_twist(odometry_fault_rows([section("zero")]), 1e6, PERIOD, MOVES, TOLD).told.v == 0.0
+    assert [faulty_twist(rows, t, PERIOD, MOVES, TOLD, WANTED).told.v == 0.0 for t in (2.9, 3.0)] == [
+        True,
+        False,
+    ]
+    assert (
+        faulty_twist(odometry_fault_rows([section("zero")]), 1e6, PERIOD, MOVES, TOLD, WANTED).told.v == 0.0
+    )
 
 
 def test_a_pose_is_reset_once() -> None:
     rows = odometry_fault_rows([section("reset")])
-    assert [faulty_twist(rows, 2.0 + k * PERIOD, PERIOD, MOVES, TOLD).resets for k in range(3)] == [
+    assert [faulty_twist(rows, 2.0 + k * PERIOD, PERIOD, MOVES, TOLD, WANTED).resets for k in range(3)] == [
         True,
         False,
         False,

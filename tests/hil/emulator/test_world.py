@@ -47,7 +47,8 @@ FAULTS = (
 LYING = (
     'robot.odometry_faults=[{kind="scale", at_s=0.05, duration_s=0.1}, {kind="slip", at_s=0.05},'
     ' {kind="reversed", at_s=0.1}, {kind="reset", at_s=0.15}, {kind="delay", at_s=0.2, delay_s=0.05},'
-    ' {kind="zero", at_s=0.3}, {kind="nan", at_s=0.35}, {kind="silent", at_s=0.4}]'
+    ' {kind="commands", at_s=0.25}, {kind="zero", at_s=0.3}, {kind="nan", at_s=0.35},'
+    ' {kind="silent", at_s=0.4}]'
 )
 LOOSE = ["mocap.jitter_s=0.02", "mocap.loss=0.2", "robot.odometry_delay_s=0.017", "mocap.clock_drift_ppm=300"]
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
-from estimation.own_motion.odometry_history import IDEAL
+from estimation.own_motion.odometry_history import AS_TOLD, IDEAL
 from formation.pose import Motion, Pose, advance
 from hil.emulator.lab_messages import frame_message, odometry_message
 from hil.lockstep.lockstep import EPOCH_NS, Lockstep
@@ -30,14 +31,17 @@ def wheels(k: int) -> Motion:
 
 
 def lived(
-    node: EstimatorNode, steps: int, scale: float, late: int
+    node: EstimatorNode, steps: int, scale: float, late: int, lag: float = 0.0
 ) -> tuple[EstimatorState, list[msg.LeaderEstimate]]:
     """State after a drive past a standing leader with odometry that tells ``scale`` of the motion, late."""
     generator, follower, found = np.random.default_rng(4), Pose(0.0, 0.0, 0.5), []
-    state = node.begin(EPOCH_NS)
+    state, moved = node.begin(EPOCH_NS), wheels(0)
     for k in range(steps):
         at_ns, shake = EPOCH_NS + k * STEP_NS, generator.normal(size=5).tolist()
         told = wheels(k - late)
+        wanted = wheels(k)
+        kept = math.exp(-STEP_NS * 1e-9 / lag) if lag > 0.0 else 0.0
+        moved = Motion(wanted.v + kept * (moved.v - wanted.v), wanted.u + kept * (moved.u - wanted.u))
         measured = Motion(scale * told.v + 0.002 * shake[3], scale * told.u + 0.01 * shake[4])
         seen = Pose(
             follower.x + 3e-4 * shake[0], follower.y + 3e-4 * shake[1], follower.theta + 3e-3 * shake[2]
@@ -49,7 +53,7 @@ def lived(
             found += [
                 decode_as(m.payload, msg.LeaderEstimate) for m in sent if m.topic == node.topics.estimate
             ]
-        follower = advance(follower, wheels(k).v, wheels(k).u, STEP_NS * 1e-9)
+        follower = advance(follower, moved.v, moved.u, STEP_NS * 1e-9)
     return state, found
 
 
@@ -79,9 +83,51 @@ def test_good_odometry_is_left_alone_and_nothing_is_done_unasked() -> None:
     state, found = lived(asked, 300, scale=1.0, late=0)
     untouched, expected = lived(plain, 300, scale=1.0, late=0)
     assert state.comparison.found.delay is not None
-    assert state.comparison.applied == IDEAL
+    # What is left is what an alignment is uncertain by, and unused where no motion is said to come later.
+    assert state.comparison.applied._replace(left=AS_TOLD) == IDEAL
+    assert 0.0 < state.comparison.applied.left < 0.1
     assert untouched.comparison.poses == ()
     assert [each.v1 for each in found] == [each.v1 for each in expected]
+
+
+def test_a_lag_is_found_and_odometry_passed_through_it() -> None:
+    node = EstimatorNode(
+        load_scenario("turtlebot3", ["estimator.align_odometry=true", "estimator.own_motion=odometry"])
+    )
+    state, found = lived(node, 900, scale=1.0, late=0, lag=0.25)
+    applied = state.comparison.applied
+    assert applied.time_constant == pytest.approx(0.25, abs=0.04)
+    assert applied.delay + applied.time_constant == pytest.approx(0.25 - 0.5 * STEP_NS * 1e-9, abs=0.02)
+    report = decode_as(node.report(state, EPOCH_NS).payload, msg.DiagnosticArray).status[0]
+    reported = {entry.key: entry.value for entry in report.values}
+    assert float(reported["odometry.time_constant"]) == pytest.approx(applied.time_constant, abs=1e-3)
+    moved, true = 0.0, []
+    for k in range(900):
+        kept = math.exp(-STEP_NS * 1e-9 / 0.25)
+        moved = wheels(k).u + kept * (moved - wheels(k).u)
+        true.append(moved)
+    off = np.array([each.u2 for each in found[-150:]]) - true[-150:]
+    untold = np.array([wheels(k).u for k in range(750, 900)]) - true[-150:]
+    assert np.sqrt(np.mean(off**2)) < 0.4 * np.sqrt(np.mean(untold**2))
+
+
+def test_a_lag_that_is_told_is_used_from_the_start() -> None:
+    told = ["estimator.input_time_constant_s=0.25", "estimator.input_scale_u=0.8"]
+    for source in ("odometry", "auto"):
+        node = EstimatorNode(load_scenario("turtlebot3", [*told, f"estimator.own_motion={source}"]))
+        state, found = lived(node, 120, scale=1.0, late=0, lag=0.25)
+        history = state.memory.history
+        answer = history[0].u2
+        for before, after in itertools.pairwise(history):
+            # The signal as a straight line in many small pieces, each of them held.
+            for piece in range(200):
+                share = (piece + 0.5) / 200
+                held = before.u2 + share * (after.u2 - before.u2)
+                kept = math.exp(-(after.stamp_ns - before.stamp_ns) * 1e-9 / 200 / 0.25)
+                answer = held + kept * (answer - held)
+            assert after.answer_u == pytest.approx(answer, abs=1e-5)
+        if source == "odometry":
+            assert found[-1].u2 == pytest.approx(0.8 * history[-1].answer_u, abs=1e-9)
 
 
 def test_emulated_odometry_is_late_and_scaled_as_told() -> None:

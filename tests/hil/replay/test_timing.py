@@ -109,9 +109,33 @@ def test_a_log_that_tells_nothing_is_refused_by_what_it_lacks(
 def test_commands_that_stand_in_for_odometry_are_told_from_it(run_log: Path) -> None:
     scenario = load_scenario("turtlebot3", ["estimator.input_lag_s=0.3", "estimator.stamp_offset_s=0.01"])
     found = timing_of(read_log(run_log), scenario)
-    assert not found.known
+    assert (found.response, found.lateness) == (None, None)
     assert "commands stand in for odometry (estimator.input_lag_s is 0.3)" in found.unknown[0]
     assert "record wheel odometry" in found.unknown[0]
+
+
+def test_odometry_that_repeats_commands_tells_the_lag_of_the_robot(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told = 'robot.odometry_faults=[{kind="commands", at_s=0.0}]'
+    turning = 'leader.program={kind="sinusoid", v=0.08, u_mean=0.1, u_amplitude=0.5, omega=1.5}'
+    given = [told, turning, "run.duration_s=30", "robot.lag_s=0.2", "controller.lag_s=0.2"]
+    given += ["estimator.own_motion=mocap", "estimator.input_lag_s=0.3"]
+    scenario = load_scenario("turtlebot3", given)
+    run_lockstep(scenario, tmp_path / "run.mcap")
+    code, out, err = calibrated(capsys, tmp_path / "run.mcap", "--json")
+    assert code == 0
+    found = json.loads(out)
+    odometry, settings = found["odometry"], found["settings"]
+    delay, lag, scale_v, scale_u = odometry["sd"]
+    assert odometry["input_time_constant_s"] == pytest.approx(0.2, abs=4.0 * lag)
+    assert odometry["input_delay_s"] == pytest.approx(0.0, abs=4.0 * delay + 0.01)
+    assert odometry["input_scale_v"] == pytest.approx(1.0, abs=4.0 * scale_v)
+    assert odometry["input_scale_u"] == pytest.approx(1.0, abs=4.0 * scale_u)
+    assert lag < 0.04
+    assert settings["estimator.input_time_constant_s"] == pytest.approx(0.2, abs=4.0 * lag)
+    assert 0.0 < settings["estimator.input_lag_s"] < 0.05
+    assert "input_time_constant_s" in err
 
 
 def test_of_a_chain_a_follower_must_be_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
