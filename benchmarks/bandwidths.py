@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from benchmarks.random_leaders import random_leader
-from estimation.consistency.process_estimate import Member
+from estimation.consistency.filter_bank import Member
 from estimation.consistency.slip_estimate import BANK
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import Measurement, PoseNoise, measure_body, measure_world
@@ -168,13 +168,12 @@ def followed(
 ) -> int:
     """Take measurements in as a node does; an estimate for each."""
     memory = Memory(borrowed(points), borrowed(history), borrowed(own), borrowed(ways), borrowed(bank))
-    fixed, known = load(Rules, rules, 0), load(Known, knowns, 0)
+    fixed, tracked = load(Rules, rules, 0), borrowed(knowns)
     for k in range(size(seen)):
         measurement = load(Measurement, seen, k)
-        known = estimator_step.take(known, memory, fixed, measurement).known
-        told = estimator_step.estimate(known, memory.points, fixed, measurement.capture_ns)
+        estimator_step.take(tracked, memory, fixed, measurement)
+        told = estimator_step.estimate(load(Known, tracked, 0), memory.points, fixed, measurement.capture_ns)
         store(estimates, k, told.estimate)
-    store(knowns, 0, known)
     return size(seen)
 
 

@@ -29,7 +29,7 @@ from formation.angles import FloatArray, wrap
 from formation.kernel import entry
 from formation.lending import lent
 from formation.pose import Pose
-from formation.records import Matrix, Rows, load, store
+from formation.records import Matrix, Rows, load
 from hil.nodes import estimator_step as step
 from hil.nodes.estimator import EstimatorNode
 from hil.nodes.estimator_desk import Desk, NodeRules, forget
@@ -52,10 +52,10 @@ def fold(desks: Rows[Desk], start_ns: int, period_ns: int, frames: Matrix, found
     for k in range(frames.shape[1]):
         capture_ns = start_ns + k * period_ns
         seen = PairSeen(frames[0, k], frames[1, k], Pose(frames[2, k], frames[3, k], frames[4, k]))
-        taken = step.take_frame(load(Known, desk.known, 0), desk.memory(), rules.step, capture_ns, seen)
-        store(desk.known, 0, taken.known)
-        told = step.estimate(taken.known, desk.points, rules.step, capture_ns).estimate
-        window = window_velocity(desk.points, taken.known.track, rules.assumed.positions.longest)
+        step.take_frame(desk.known, desk.memory(), rules.step, capture_ns, seen)
+        known = load(Known, desk.known, 0)
+        told = step.estimate(known, desk.points, rules.step, capture_ns).estimate
+        window = window_velocity(desk.points, known.track, rules.assumed.positions.longest)
         bound = bounds_of(told, rules.assumed, window)
         found[0, k], found[1, k], found[5, k] = told.v1, told.alpha1, float(told.status)
         found[2, k], found[3, k], found[4, k] = bound.v1, bound.alpha1, bound.h

@@ -1,6 +1,6 @@
 """How well leaders of real recordings are estimated: MRCLAM pairs by every front end, a TurtleBot3 by LiDAR.
 
-    ABREAST_REAL=FOLDER python benchmarks/recordings.py [--only camera] [--set KEY=VALUE] [--each]
+    ABREAST_REAL=DIR python benchmarks/recordings.py [--only camera] [--set KEY=VALUE] [--answered] [--each]
 
 The LiDAR has a row as it is, and one with the offsets that ``abreast calibrate`` finds in its first 6.6 s.
 
@@ -34,6 +34,7 @@ from hil.recordings.csv_import import import_csv
 from hil.recordings.mrclam_import import Sightings, import_mrclam
 from hil.replay.calibration import calibrate
 from hil.replay.rerun import replay
+from hil.replay.timing import timing_of
 from hil.scenario.files import with_overrides
 
 PAIRS = ((1, 2), (2, 3), (3, 4), (4, 5), (5, 1), (3, 1))
@@ -53,12 +54,18 @@ LIDAR, CALIBRATED_TO = "turtlebot3_lidar_optitrack", 6.6
 FIGURES = ("v1", "/const", "/guess", "alpha1", "corr", "tracked", ">5sd", "nees v1", "nees alpha1", "nis")
 
 
-def figures_of(log: Path, overrides: Sequence[str] = ()) -> list[float]:
-    """Figures of one log, replayed with keys of its scenario changed."""
+def figures_of(log: Path, overrides: Sequence[str] = (), *, answered: bool = False) -> list[float]:
+    """Figures of one log, replayed with keys of its scenario changed.
+
+    ``answered``: with what ``abreast calibrate`` finds of how its motion answers its odometry.
+    """
     opened = read_log(log)
     own = scenario_of(opened)
     if own is None:
         raise SystemExit(f"{log}: was not made by abreast")
+    if answered:
+        found = timing_of(opened, own).settings(own)
+        own = with_overrides(own, [f"{key}={value}" for key, value in found.items() if ".input_" in key])
     scenario = with_overrides(own, [f"estimator.{each}" for each in overrides])
     columns = columns_of(run_data_of_replay(opened, replay(opened, scenario)))
     samples, v_eps = columns.samples, scenario.leader.v_eps
@@ -96,6 +103,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", default="", help="ways whose name has this in it")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="of the estimator")
+    parser.add_argument("--answered", action="store_true", help="odometry as calibrate says it is answered")
     parser.add_argument("--each", action="store_true", help="print every pair")
     given = parser.parse_args()
     real = Path(os.environ["ABREAST_REAL"])
@@ -109,7 +117,7 @@ def main() -> None:
                 log = Path(folder) / f"{sightings}{leader}{follower}.mcap"
                 if not log.exists():
                     import_mrclam(real / "mrclam6", leader, follower, log, sightings)
-                rows.append(figures_of(log, [*overrides, *given.set]))
+                rows.append(figures_of(log, [*overrides, *given.set], answered=given.answered))
                 if given.each:
                     _print(f"  {leader} seen by {follower}", rows[-1])
             _print(name, np.nanmedian(np.array(rows), axis=0).tolist())

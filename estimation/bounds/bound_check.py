@@ -123,11 +123,21 @@ def check(errors: Mapping[str, Values], bounds: Mapping[str, Values]) -> Verdict
     for name, bound in bounds.items():
         error, limit = np.broadcast_arrays(np.asarray(errors[QUANTITY_OF[name]]), np.asarray(bound))
         violations[name] = int(np.count_nonzero(~(error <= limit + ROUNDING)))
-        # Where bound and error are zero up to rounding there is nothing to be tight about.
-        counted = error > ROUNDING
-        ratio = np.divide(error, limit, out=np.full(error.shape, np.inf), where=limit > 0.0)
-        tightness[name] = float(np.max(ratio, where=counted, initial=0.0))
+        tightness[name] = _tightness(error, limit)
     return Verdict(violations, tightness)
+
+
+def _tightness(error: FloatArray, limit: FloatArray) -> float:
+    """Largest error over its bound.
+
+    Where bound and error are zero up to rounding there is nothing to be tight about.
+    """
+    counted, positive = error > ROUNDING, limit > 0.0
+    if not np.all(positive):
+        ratio = np.divide(error, limit, out=np.full(error.shape, np.inf), where=positive)
+    else:
+        ratio = error / limit
+    return float(np.max(ratio if np.all(counted) else ratio[counted], initial=0.0))
 
 
 def _asked_across(seen: SpeedInputs, mu1: float, spacing: Spacing, station: Station) -> FloatArray:

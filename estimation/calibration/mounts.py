@@ -16,8 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.calibration.smoothed_track import LocalFit, fitted_rates
-from formation.angles import FloatArray, wrap
+from estimation.models.measurement import PoseNoise
+from estimation.tracking.mount_check import NO_MOUNT_CHECK, mount_left, watched
+from formation.angles import FloatArray, wrap, wrapped
 from formation.mount import Mount
+from formation.pose import Pose
 
 LEAST_S = 3.0
 """Seconds of motion that a mount rests on at least."""
@@ -38,6 +41,7 @@ _LONGEST_GAP_S = 0.25
 _LEAST_SIGNAL = 10.0  # of a direction of motion against what noise makes of it, as a ratio of powers
 _AT_LEAST = 1e-12
 _CONVERGED = 1e-10
+_SHORT_ROUNDS = 3  # the second looks along the robot's axes, the third makes nothing of it any more
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,6 +140,26 @@ def find_mount(t: FloatArray, poses: FloatArray, wheels: WheelSpeed | None = Non
     (_, sd_yaw), (x, sd_x) = across.of(0), across.of(1)
     y, sd_y = _sideways(moves, yaw, wheels)
     return _known(x, y, yaw, (sd_x, sd_y, sd_yaw))
+
+
+def short_drive_mount(stamps_ns: list[int], poses: list[Pose], noise: PoseNoise) -> FoundMount:
+    """What a drive tells that is too short for :func:`find_mount`, as of a robot stopped for its mount.
+
+    ``poses``: of the body, at increasing times [ns], with their noise. It is what the live check of a mount
+    has seen: yaw and x, by the chords of short arcs; y takes longer.
+    """
+    yaw = 0.0
+    left = mount_left(NO_MOUNT_CHECK)
+    for _ in range(_SHORT_ROUNDS):
+        check = NO_MOUNT_CHECK
+        for at_ns, pose in zip(stamps_ns, poses, strict=True):
+            robot = pose._replace(theta=wrapped(pose.theta - yaw))
+            check = watched(check, at_ns, robot, noise, False)
+        left = mount_left(check)
+        if not left.known:
+            return NOTHING_FOUND
+        yaw = wrapped(yaw + left.yaw)
+    return _known(left.place, 0.0, yaw, (left.sd_place, math.inf, left.sd_yaw))
 
 
 def _known(x: float, y: float, yaw: float, sd: tuple[float, float, float]) -> FoundMount:

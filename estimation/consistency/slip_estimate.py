@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from estimation.consistency.process_estimate import MEMBERS, Member
+from estimation.consistency.filter_bank import LANES, Member
 from estimation.filters.ekf import informed
 from estimation.filters.filter import EKF, Filter
 from estimation.filters.gaussian import Gaussian, nis_of
@@ -28,7 +28,7 @@ from formation.records import Rows, load, store
 SLIP_MEMBERS, SLIP_RATIO, SLIP_LOWEST = 5, 10.0 ** (1.0 / 3.0), 0.1
 """Filters, ratio between their deviations, and the lowest over what is told: from a tenth to twice that."""
 
-BANK = MEMBERS + SLIP_MEMBERS
+BANK = LANES + SLIP_MEMBERS
 """Rows of a bank with room for these behind those for the process noise."""
 
 FORGOTTEN = 30.0
@@ -78,7 +78,7 @@ def learn_slip(learned: LearnedSlip, bank: Rows[Member], point: TrackPoint, esti
     if not learned.begun:
         if point.verdict != USED:
             return learned
-        for k in range(MEMBERS, BANK):
+        for k in range(LANES, BANK):
             # Scores of zero where there are none yet: rows begin with that.
             store(bank, k, load(Member, bank, k)._replace(belief=point.belief))
         nowhere = FollowerMotion(0.0, 0.0, 0.0, 0.0)
@@ -108,13 +108,13 @@ def _scored(learned: LearnedSlip, bank: Rows[Member], point: TrackPoint, estimat
     mean = FollowerMotion(way.v2 * by, way.u2 * by, math.sqrt(way.sd_v2 * by), math.sqrt(way.sd_u2 * by))
     highest = -math.inf
     one = estimator._replace(kind=EKF, noise=point.noise)
-    for k in range(MEMBERS, BANK):
+    for k in range(LANES, BANK):
         motion = mean._replace(sd_v2=off * mean.sd_v2, sd_u2=off * mean.sd_u2)
         prior = one.predict(load(Member, bank, k).belief, dt, motion)
         highest = max(highest, _score(bank, k, kept, prior, point))
         off = off * SLIP_RATIO
     total, sum_, apart = 0.0, 0.0, math.log(SLIP_LOWEST)
-    for k in range(MEMBERS, BANK):
+    for k in range(LANES, BANK):
         told = apart / _TOLD_SD
         weight = math.exp(load(Member, bank, k).score - highest) / (1.0 + 0.5 * told * told)
         total, sum_ = total + weight, sum_ + weight * apart
@@ -134,9 +134,10 @@ def _score(bank: Rows[Member], k: int, kept: float, prior: Gaussian, point: Trac
     seen = point.measurement
     nis, spread = nis_of(prior, seen.x, seen.y, seen.spread), seen.spread
     a, b, c = prior.x_x + spread.xx, prior.x_y + spread.xy, prior.y_y + spread.yy
-    score = kept * load(Member, bank, k).score - 0.5 * (min(nis, _LARGEST_NIS) + math.log(a * c - b * b))
+    member = load(Member, bank, k)
+    score = kept * member.score - 0.5 * (min(nis, _LARGEST_NIS) + math.log(a * c - b * b))
     if nis <= _LARGEST_NIS:
-        store(bank, k, Member(informed(prior, seen.x, seen.y, spread), score))
+        store(bank, k, member._replace(belief=informed(prior, seen.x, seen.y, spread), score=score))
     else:
-        store(bank, k, Member(point.belief, score))
+        store(bank, k, member._replace(belief=point.belief, score=score))
     return score

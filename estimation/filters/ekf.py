@@ -34,7 +34,12 @@ def mean_of(b: Gaussian) -> State:
 @kernel
 def extended_moved(b: Gaussian, dt: float, noise: ProcessNoise) -> Gaussian:
     """Carry a belief through dt [s] in a fixed frame: the covariance by the Jacobian of the motion."""
-    t = swing(b.u, dt)
+    return swung_on(b, swing(b.u, dt), dt, noise)
+
+
+@kernel
+def swung_on(b: Gaussian, t: Swing, dt: float, noise: ProcessNoise) -> Gaussian:
+    """The same by a swing that is known."""
     before = mean_of(b)
     after = moved(before, t)
     j = by_turn_rate(before, after, t, dt)

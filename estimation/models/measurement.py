@@ -185,7 +185,7 @@ def measure_body_anchored(
 
 @kernel
 def seen_in_range(measurement: Measurement) -> Measurement:
-    """A measurement along the follower's axes of which the range counts, its bearing being off by a radian."""
+    """A measurement along the follower's axes whose range counts, its bearing being off by a radian."""
     x, y, spread = measurement.x, measurement.y, measurement.spread
     return measurement._replace(spread=Spread(spread.xx + y * y, spread.xy - x * y, spread.yy + x * x))
 

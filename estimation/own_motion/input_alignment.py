@@ -85,7 +85,7 @@ class _Answer(NamedTuple):
         """Standard deviations in the order of the covariance; infinite without one."""
         if self.covariance is None:
             return np.full(4, np.inf)
-        sds: FloatArray = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2).max(axis=0))
+        sds: FloatArray = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2).max(axis=0).clip(0.0))
         return sds
 
 

@@ -126,7 +126,7 @@ def own_begun(
     return OwnPoint(capture_ns, pose, noise.pose, has_odometry, odometry, state, spread, capture_ns, 0)
 
 
-@kernel(inline=False)
+@kernel
 def own_followed(last: OwnPoint, due: OwnPoint, noise: OwnNoise) -> OwnPoint:
     """Fold the pose and odometry of ``due``, begun from its pose alone and newer than the point, into it."""
     if (due.capture_ns - last.used_ns) * _NS > _LONGEST:
@@ -289,7 +289,7 @@ def own_place(track: Rows[OwnPoint], ring: Ring, capture_ns: int) -> int:
     return k
 
 
-@kernel
+@kernel(inline=False)
 def own_predicted(track: Rows[OwnPoint], ring: Ring, due: OwnPoint, noise: OwnNoise) -> OwnPoint:
     """Point that the pose of ``due`` would become at its place, without putting it there.
 

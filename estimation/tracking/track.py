@@ -14,7 +14,7 @@ from estimation.models.measurement import Measurement
 from estimation.tracking import tracker
 from estimation.tracking.track_point import TrackPoint, Verdict, begun
 from estimation.tracking.tracker import Status, TrackSettings
-from formation.records import Rows
+from formation.records import Rows, load, plain_rows_of
 from formation.ring import Ring
 
 Track = tuple[TrackPoint, ...]
@@ -37,8 +37,10 @@ class Tracker:
         return begun(measurement, self.estimator)
 
     def follow(self, last: TrackPoint, measurement: Measurement) -> TrackPoint:
-        """Fold one measurement, newer than the point, into it; see :func:`.tracker.follow`."""
-        return tracker.follow(last, measurement, self.settings, self.estimator)
+        """Fold one measurement, newer than the point, into it; see :func:`.tracker.fold`."""
+        point = plain_rows_of(TrackPoint, 1)
+        tracker.fold(point, 0, last, measurement, self.settings, self.estimator)
+        return load(TrackPoint, point, 0)
 
     def add(self, track: Track, measurement: Measurement) -> tuple[Track, Verdict]:
         """Fold a measurement in at its place in time; see :func:`estimation.tracking.tracker.add`."""

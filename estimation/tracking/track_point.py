@@ -16,6 +16,8 @@ from estimation.tracking.manoeuvre import Manoeuvre, steady
 from formation.kernel import kernel
 from formation.pose import Pose
 
+_NS = 1e-9
+
 
 class Verdict(IntEnum):
     """What became of a measurement."""
@@ -151,3 +153,17 @@ def next_period(period: float, dt: float) -> float:
         return dt
     step = 0.1 * period
     return period + min(step, max(-step, dt - period))
+
+
+@kernel
+def lasting(jump: JumpUncertainty, now_ns: int, uncertain_for: float) -> JumpUncertainty:
+    """Uncertainty as it is now: a body that has stayed where it jumped for ``uncertain_for`` [s] is there."""
+    if (now_ns - jump.since_ns) * _NS <= uncertain_for:
+        return jump
+    return JumpUncertainty(0.0, 0.0, 0)
+
+
+@kernel
+def with_motion(point: TrackPoint, motion: FollowerMotion) -> TrackPoint:
+    """Point whose measurement has another motion of the follower; its belief is still the old one."""
+    return point._replace(measurement=point.measurement._replace(motion=motion))

@@ -1,8 +1,8 @@
 """From measurements in any order to a belief with a status: gates, re-acquisition, coasting, rewind ring.
 
-A track is a fold: ``point = follow(point, measurement)`` in the order of capture times. A ring of the last
-points lets a late measurement be folded in where it belongs, so that the result is what delivery in order
-would have given.
+A track is a fold: each measurement into the point of the one before, in the order of capture times. A ring of
+the last points lets a late measurement be folded in where it belongs, so that the result is what delivery in
+order would have given.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from estimation.filters.filter import Filter
 from estimation.filters.gaussian import Gaussian, sd_heading_of, speed_of
-from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits
+from estimation.models.coordinated_turn import LeaderLimits
 from estimation.models.measurement import Measurement
 from estimation.tracking.follower_check import (
     BELIEVED,
@@ -36,9 +36,9 @@ from estimation.tracking.track_point import (
     RESTARTED,
     SAME_NS,
     USED,
-    JumpUncertainty,
     TrackPoint,
     begun,
+    lasting,
     next_period,
     no_tentative,
     way_to,
@@ -152,10 +152,15 @@ def status_of(point: TrackPoint, now_ns: int, settings: TrackSettings) -> int:
 
 
 @kernel
-def follow(
-    last: TrackPoint, measurement: Measurement, settings: TrackSettings, estimator: Filter
-) -> TrackPoint:
-    """Fold one measurement, newer than the point, into it.
+def fold(
+    points: Rows[TrackPoint],
+    row: int,
+    last: TrackPoint,
+    measurement: Measurement,
+    settings: TrackSettings,
+    estimator: Filter,
+) -> None:
+    """Fold one measurement, newer than the point ``last``, into that; the point of it goes into a row.
 
     It is used if the leader passes the gate and the frame its checks. If not, it joins the tentative track,
     which takes over when enough measurements agree and the jump is small against the distance: more than
@@ -164,7 +169,8 @@ def follow(
     capture_ns, full_gate = measurement.capture_ns, gate_of(settings)
     found = _checked(last, measurement, full_gate, estimator)
     if (capture_ns - last.used_ns) * _NS > lost_after(last, settings):
-        return _found(last, measurement, found, settings, estimator)
+        store(points, row, _found(last, measurement, found, settings, estimator))
+        return
     # Nothing passes a negative gate: the belief is then the prediction.
     gate = full_gate if found.cause == BELIEVED else -1.0
     dt = (capture_ns - last.measurement.capture_ns) * _NS
@@ -180,21 +186,28 @@ def follow(
         is_settled(estimator.leader(stepped.belief, measurement), last.settled, settings, estimator.limits),
         no_tentative(stepped.belief),
         found.check,
-        BELIEVED,
-        _lasting(last.jump, capture_ns, settings),
+        found.cause,
+        lasting(last.jump, capture_ns, settings.jump_uncertain_for),
         estimator.noise,
         followed.manoeuvre,
         next_period(last.period, dt),
         way,
         dt,
     )
-    if stepped.nis <= gate:
-        return point
-    cause = LEADER_OFF if found.cause == BELIEVED else found.cause
+    # Stored where it is made: points that come together from several ways would be moved about.
+    store(points, row, point)
+    if not stepped.nis <= gate:
+        store(points, row, _refused(point, last, settings, estimator))
+
+
+@kernel(inline=False)
+def _refused(point: TrackPoint, last: TrackPoint, settings: TrackSettings, estimator: Filter) -> TrackPoint:
+    """Point of a measurement that was not used, or of the tentative track that takes over with it."""
+    cause = LEADER_OFF if point.cause == BELIEVED else point.cause
     rejected = point._replace(verdict=GATED, used_ns=last.used_ns, cause=cause)
     if cause == FROZEN:
         return rejected
-    tentative = joined(last.tentative, measurement, estimator, full_gate)
+    tentative = joined(last.tentative, point.measurement, estimator, gate_of(settings))
     return _taken_over(rejected._replace(tentative=tentative), settings, estimator)
 
 
@@ -272,14 +285,6 @@ def _taken_over(rejected: TrackPoint, settings: TrackSettings, estimator: Filter
     )
 
 
-@kernel
-def _lasting(jump: JumpUncertainty, now_ns: int, settings: TrackSettings) -> JumpUncertainty:
-    """Uncertainty as it is now: a body that has stayed where it jumped for long enough is there."""
-    if (now_ns - jump.since_ns) * _NS <= settings.jump_uncertain_for:
-        return jump
-    return JumpUncertainty(0.0, 0.0, 0)
-
-
 # The rewind ring
 
 
@@ -323,10 +328,12 @@ def add(
     n = ring.length
     if n == 0 or measurement.capture_ns < capture_at(points, ring, n - 1) + SAME_NS:
         return _inserted(points, ring, measurement, settings, estimator)
-    point = follow(point_at(points, ring, n - 1), measurement, settings, estimator)
+    last = point_at(points, ring, n - 1)
     if n == size(points):
         ring, n = Ring(place(ring, points, 1), n - 1), n - 1
-    store(points, place(ring, points, n), point)
+    row = place(ring, points, n)
+    fold(points, row, last, measurement, settings, estimator)
+    point = load(TrackPoint, points, row)
     return Added(trimmed(points, Ring(ring.first, n + 1), settings), point.verdict, point.cause)
 
 
@@ -385,16 +392,8 @@ def reprocessed(
     The oldest point keeps its belief: what that rests on is gone.
     """
     first = max(k, 1)
-    point = point_at(points, ring, first - 1)
     for at in range(first, ring.length):
         # By the noise that it had: what has been learned since is not for it.
-        old = point_at(points, ring, at)
-        point = follow(point, old.measurement, settings, estimator.driven_by(old.noise))
-        store(points, place(ring, points, at), point)
+        last, old, row = point_at(points, ring, at - 1), point_at(points, ring, at), place(ring, points, at)
+        fold(points, row, last, old.measurement, settings, estimator.driven_by(old.noise))
     return ring.length - first
-
-
-@kernel
-def with_motion(point: TrackPoint, motion: FollowerMotion) -> TrackPoint:
-    """Point whose measurement has another motion of the follower; its belief is still the old one."""
-    return point._replace(measurement=point.measurement._replace(motion=motion))

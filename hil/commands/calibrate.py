@@ -86,6 +86,12 @@ def _say_mounts(found: Mounts) -> None:
         return
     click.echo(said("leader", found.leader), err=True)
     click.echo(said("follower", found.follower), err=True)
+    if None in (found.follower.x, found.follower.y, found.follower.yaw):
+        click.echo(
+            "what is not told takes half a minute with left and right turns; a follower that was stopped for "
+            'its mount drives that with what is put in now, or with controller.mount_check = "warn"',
+            err=True,
+        )
     click.echo("put into the scenario:", err=True)
     for key, mount in found.settings.items():
         section, _, name = key.partition(".")

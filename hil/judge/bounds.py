@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -56,10 +57,10 @@ def judge_bounds(scenario: Scenario, columns: Columns) -> dict[str, object]:
         return result
     errors = bound_errors(scenario, columns)
     bounds = named_bounds(scenario, columns, given)
-    verdict = check(
-        {name: error[known] for name, error in errors.items()},
-        {name: bound[known] for name, bound in bounds.items()},
-    )
+    if not np.all(known):
+        errors = {name: error[known] for name, error in errors.items()}
+        bounds = {name: bound[known] for name, bound in bounds.items()}
+    verdict = check(errors, bounds)
     return result | {"violations": verdict.violations, "tightness": verdict.tightness}
 
 
@@ -93,11 +94,17 @@ def worst_errors(scenario: Scenario, columns: Columns) -> WorstErrors:
     """
     errors = actual_errors(columns)
     largest: dict[str, Values] = {
-        name: float(np.nanmax(error)) for name, error in errors.items() if not np.all(np.isnan(error))
+        name: _largest(error) for name, error in errors.items() if not np.all(np.isnan(error))
     }
     if len(largest) < len(errors):
         largest = assumed_errors(scenario, columns.samples) | largest
     return WorstErrors.of(largest)
+
+
+def _largest(error: FloatArray) -> float:
+    """Largest error that is known."""
+    largest = float(np.max(error))
+    return float(np.nanmax(error)) if math.isnan(largest) else largest
 
 
 def actual_errors(columns: Columns) -> dict[str, FloatArray]:

@@ -73,6 +73,8 @@ class EstimateColumns:
 
     def only(self, rows: NDArray[np.bool_]) -> EstimateColumns:
         """The estimates in the given rows."""
+        if np.all(rows):
+            return self
         seen = Perceived(*(np.asarray(getattr(self.seen, name))[rows] for name in _SEEN))
         return EstimateColumns(
             capture_ns=self.capture_ns[rows],

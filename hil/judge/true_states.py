@@ -122,11 +122,16 @@ def _with_shape(recorded: FloatArray) -> FloatArray:
     NaN where both robots are in one place: there is no shape. A leader that drives backwards is turned round,
     as its alpha1 is that of its direction of travel.
     """
-    backwards = recorded[:, _V1] < 0.0
-    recorded[backwards, _HEADINGS[0]] += math.pi
-    recorded[backwards, _V1] *= -1.0
-    recorded[:, _HEADINGS] = wrap(recorded[:, _HEADINGS])
-    lx, ly, ltheta, fx, fy, ftheta, v1, _, v2, u2 = recorded.T
+    # Column by column in memory: everything that follows works on columns.
+    rows = np.empty((_RECORDED_SIZE + _SHAPE_SIZE, len(recorded))).T
+    rows[:, :_RECORDED_SIZE] = recorded
+    backwards = rows[:, _V1] < 0.0
+    if np.any(backwards):
+        rows[backwards, _HEADINGS[0]] += math.pi
+        rows[backwards, _V1] *= -1.0
+    for heading in _HEADINGS:
+        rows[:, heading] = wrap(rows[:, heading])
+    lx, ly, ltheta, fx, fy, ftheta, v1, _, v2, u2 = rows.T[:_RECORDED_SIZE]
     dx, dy = fx - lx, fy - ly
     rho, line = np.hypot(dx, dy), np.arctan2(dy, dx)
     rho = np.where(rho > 0.0, rho, math.nan)
@@ -134,4 +139,6 @@ def _with_shape(recorded: FloatArray) -> FloatArray:
     alpha1, alpha2 = wrap(line - ltheta) + apart, wrap(line + math.pi - ftheta) + apart
     turning = (v1 * np.sin(alpha1) + v2 * np.sin(alpha2)) / rho
     rho_dot = -v1 * np.cos(alpha1) - v2 * np.cos(alpha2)
-    return np.column_stack([recorded, rho, alpha1, alpha2, rho_dot, turning - u2])
+    for column, values in enumerate((rho, alpha1, alpha2, rho_dot, turning - u2), _RECORDED_SIZE):
+        rows[:, column] = values
+    return rows

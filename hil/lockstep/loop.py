@@ -17,7 +17,7 @@ from estimation.tracking.track_point import DUPLICATE, LATE
 from estimation.tracking.tracker import COASTING, LOST, newest, status_of
 from formation.kernel import kernel
 from formation.pose import Motion
-from formation.records import load, size, store
+from formation.records import load, part, size, store
 from hil.emulator.mocap import SeenPose
 from hil.emulator.robot import Robot, pose_of, travelling
 from hil.emulator.world import (
@@ -199,12 +199,12 @@ def _seen(
     """The k-th estimator takes in its pair; the number of estimates on their way."""
     rules, tracks = load(Rules, rooms.rules, k), tracks_of(rooms, plan.share, k)
     seen = estimator_step.with_robot(seen, rules.mounts)
-    taken = estimator_step.take_frame(load(Known, rooms.knowns, k), tracks, rules, capture_ns, seen)
-    store(rooms.knowns, k, taken.known)
+    knowns = part(Known, rooms.knowns, k, 1)
+    taken = estimator_step.take_frame(knowns, tracks, rules, capture_ns, seen)
     if taken.verdict in (DUPLICATE, LATE):
         return waiting
     store(rooms.clocks, k, load(Clock, rooms.clocks, k)._replace(published_ns=now_ns))
-    told = estimator_step.estimate(taken.known, tracks.points, rules, now_ns)
+    told = estimator_step.estimate(load(Known, knowns, 0), tracks.points, rules, now_ns)
     store(rooms.waiting, waiting, KeptEstimate(k, now_ns, told.estimate))
     return waiting + 1
 
@@ -234,7 +234,7 @@ def _heard(plan: Plan, rooms: Rooms, k: int, told: Odometry, now_ns: int) -> Non
         return
     sample = OdometrySample(motion.stamp_ns, motion.v2, motion.u2, motion.has_pose, motion.pose)
     tracks, rules = tracks_of(rooms, plan.share, k), load(Rules, rooms.rules, k)
-    store(rooms.knowns, k, estimator_step.take_odometry(known, tracks, rules, sample))
+    estimator_step.take_odometry(part(Known, rooms.knowns, k, 1), tracks, rules, sample)
 
 
 @kernel(inline=False)

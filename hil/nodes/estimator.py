@@ -18,6 +18,7 @@ from estimation.own_motion.odometry_history import MotionSample
 from estimation.time.host_time import HostTime
 from estimation.tracking.estimate import Estimate
 from estimation.tracking.mount_check import is_off
+from estimation.tracking.sideways_check import NO_SIDEWAYS_CHECK, SidewaysCheck, with_ways
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE
 from formation.records import load
 from hil.nodes.certifying import Believed, certifying
@@ -27,6 +28,7 @@ from hil.nodes.estimator_records import AUTO, MOCAP, Known
 from hil.nodes.findings import Findings, named_findings
 from hil.nodes.frame_time import clock_report
 from hil.nodes.leader_findings import leader_findings
+from hil.nodes.leader_mount import UNWATCHED, LeaderMountWatch, with_leader
 from hil.nodes.mount_report import mount_findings, mount_problem, mount_report
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
 from hil.nodes.noise_report import is_refuted, noise_findings, noise_report, scale_of
@@ -35,14 +37,16 @@ from hil.nodes.own_motion_step import is_under_way
 from hil.nodes.process_report import process_report
 from hil.nodes.sensor_offsets import offsets_report
 from hil.scenario.files import refuse_unrunnable
+from hil.scenario.leader_model import leader_mount
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.certified_message import certified_message
 from hil.wire.events import Event
+from hil.wire.message_checks import planar
 from hil.wire.message_types import LeaderEstimate
 from hil.wire.messages import typename_of
 from hil.wire.reading import frame_reader
-from hil.wire.records import Receipt
+from hil.wire.records import Body, Receipt
 from hil.wire.templates import estimate_template
 from hil.wire.topics import topics_of
 from hil.wire.writing import MOST_RECEIPTS
@@ -57,11 +61,14 @@ _UNUSED = (GATED, DUPLICATE, LATE)
 class EstimatorState:
     """All that the estimator remembers; it changes in place.
 
-    ``memory``: tracks, clock, receipts and counts, in rows. ``comparison``: how odometry compares with mocap.
-    ``believed``: what certificates rest on, if any are asked for.
+    ``memory``: tracks, clock, receipts and counts, in rows. ``leader_mount``, ``sideways``: how the leader's
+    body sits on it, and the follower's beside its wheels' middle, for a word. ``comparison``: how odometry
+    compares with mocap. ``believed``: what certificates rest on, if any are asked for.
     """
 
     memory: EstimatorMemory
+    leader_mount: LeaderMountWatch = UNWATCHED
+    sideways: SidewaysCheck = NO_SIDEWAYS_CHECK
     comparison: OdometryComparison = NOTHING_SEEN
     believed: Believed = field(default_factory=Believed)
     next_tick_ns: int = 0
@@ -111,7 +118,8 @@ class EstimatorNode:
         self.topics = topics_of(scenario)
         leader, follower = self.topics.leader, self.topics.follower
         self._reader = frame_reader(others | {leader, follower})
-        self._wanted = self._reader.pair(leader, follower)
+        self._wanted, self._leader_at = self._reader.pair(leader, follower), self._reader.names.index(leader)
+        self._leader_mount = leader_mount(scenario)
         self._template = estimate_template(follower, MOST_RECEIPTS)
         self.rules = node_rules(scenario, self._template.numbers_at)
         self.aligns = given.align_odometry and given.own_motion != "mocap"
@@ -159,16 +167,25 @@ class EstimatorNode:
         came = memory.see_frame(event.payload, event.signed_digest, now_ns)
         if came != SEEN and not self._is_seen(state, came):
             return 0
+        frame, body = memory.frame, load(Body, self._reader.bodies, self._leader_at)
+        state.leader_mount = with_leader(
+            state.leader_mount,
+            frame.capture_ns,
+            planar(body.place),
+            self._leader_mount,
+            self.rules.step.noise,
+        )
         if self.aligns:
-            frame = memory.frame
             with_frame = with_pose(state.comparison, frame.capture_ns, frame.seen.follower)
             state.comparison = reconsidered(with_frame, now_ns, self.rules.step.trust)
             memory.correct(state.comparison.applied)
         length = memory.take_frame(now_ns)
         if self.certifying is not None and memory.notes.verdict not in _UNUSED:
-            capture_ns, seen = memory.frame
+            seen = frame.seen
             leader = (seen.leader_x, seen.leader_y)
-            state.believed = self.certifying.heard_frame(state.believed, capture_ns, leader, seen.follower)
+            state.believed = self.certifying.heard_frame(
+                state.believed, frame.capture_ns, leader, seen.follower
+            )
         return length
 
     def _on_sighting(self, state: EstimatorState, event: Event, now_ns: int) -> int:
@@ -199,7 +216,8 @@ class EstimatorNode:
         if came & (RESTARTED | SET_BACK):
             state.believed = Believed()
         if came & SET_BACK:
-            state.comparison = NOTHING_SEEN
+            state.comparison, state.leader_mount = NOTHING_SEEN, UNWATCHED
+            state.sideways = NO_SIDEWAYS_CHECK
         return bool(came & SEEN)
 
     def _messages(self, state: EstimatorState, length: int, now_ns: int) -> tuple[Outgoing, ...]:
@@ -228,13 +246,14 @@ class EstimatorNode:
     def report(self, state: EstimatorState, now_ns: int) -> Outgoing:
         """Diagnostics: status of the track, inputs taken and refused."""
         known = state.memory.known
+        state.sideways = with_ways(state.sideways, state.memory.ways)
         problem = "" if is_under_way(known, self.rules.step) else self._missing(known)
         stops = self.rules.step.mounts.stops
         problem = problem or mount_problem(known.mount_check, stops=stops)
         values: dict[str, object] = {"status": state.memory.status(now_ns).name.lower()}
         if stops and values["status"] in ("tracking", "initialising") and is_off(known.mount_check):
             values["status"] = "rejecting"
-        values |= mount_report(known.mount_check)
+        values |= mount_report(known.mount_check, state.leader_mount.check, state.sideways)
         values |= clock_report(state.times, state.memory.desk.time)
         values |= (
             offsets_report(state.memory.track[-1].belief)
@@ -255,7 +274,8 @@ class EstimatorNode:
         A replay in one pass asks too, and has loaded none of the node's own steps.
         """
         known, rules = state.memory.known, self.rules.step
-        found = {**mount_findings(known.mount_check), **odometry_findings(known, rules, now_ns)}
+        mounts = mount_findings(known.mount_check, state.leader_mount.check, state.sideways)
+        found = {**mounts, **odometry_findings(known, rules, now_ns)}
         found |= noise_findings(known.noise, rules.noise_learning)
         return {**found, **leader_findings(known.travel, now_ns)}
 

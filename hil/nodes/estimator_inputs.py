@@ -24,6 +24,7 @@ from hil.nodes.counting import count
 from hil.nodes.estimator_desk import Desk, NodeRules, Notes, TimedFrame, forget, forget_tracks, noted
 from hil.nodes.estimator_records import AUTO, Known, Rules, Taken
 from hil.nodes.frame_time import time_of
+from hil.nodes.noise_step import with_sight_noise
 from hil.nodes.own_motion_step import by_either_at, by_odometry, take_not_finite
 from hil.nodes.refusals import (
     BAD_RANGE,
@@ -96,7 +97,6 @@ def _estimated(desk: Desk, reasons: bytes, now_ns: int) -> int:
 @kernel
 def _moved_on(desk: Desk, taken: Taken, reasons: bytes, now_ns: int) -> int:
     """Keep what has become of a measurement, count it, and estimate from it if it was not in vain."""
-    store(desk.known, 0, taken.known)
     notes, verdict = load(Notes, desk.notes, 0), taken.verdict
     store(desk.notes, 0, notes._replace(verdict=verdict, cause=taken.cause, late=taken.late))
     if verdict in (GATED, DUPLICATE, LATE):
@@ -182,15 +182,16 @@ def sighting_seen(desk: Desk, payload: bytes, digest: int, now_ns: int) -> int:
 
 
 @kernel
-def _take_frame(desk: Desk, known: Known, rules: Rules) -> Taken:
+def _take_frame(desk: Desk, rules: Rules) -> Taken:
     """Take the frame that was seen into the tracks."""
     frame = load(TimedFrame, desk.frame, 0)
-    return step.take_frame(known, desk.memory(), rules, frame.capture_ns, frame.seen)
+    return step.take_frame(desk.known, desk.memory(), rules, frame.capture_ns, frame.seen)
 
 
 @kernel
-def _take_sighting(desk: Desk, known: Known, rules: Rules) -> Taken:
+def _take_sighting(desk: Desk, rules: Rules) -> Taken:
     """Take the sighting that was seen into the leader's track."""
+    known = load(Known, desk.known, 0)
     memory, sensor = desk.memory(), load(NodeRules, desk.rules, 0).sensor
     seen = load(Sighting, desk.sighting, 0)
     if rules.source == AUTO:
@@ -200,7 +201,7 @@ def _take_sighting(desk: Desk, known: Known, rules: Rules) -> Taken:
     scale = known.noise.scale
     sd_range, sd_bearing = scale.range * sensor.sigma_range, scale.bearing * sensor.sigma_bearing
     measurement = measure_body(seen.capture_ns, seen.rho, seen.alpha2, sd_range, sd_bearing, motion)
-    return step.with_sight_noise(step.take(known, memory, rules, measurement), memory, rules)
+    return with_sight_noise(step.take(desk.known, memory, rules, measurement), desk.known, memory, rules)
 
 
 @kernel
@@ -210,14 +211,14 @@ def taken(desk: Desk, what: int, reasons: bytes, now_ns: int) -> int:
     ``what``: FRAME, SIGHTING, or ODOMETRY, which folds again what came after the sample before it. One kernel
     for all three, so that the filter is compiled into its entry once.
     """
-    known, rules = load(Known, desk.known, 0), load(NodeRules, desk.rules, 0).step
+    rules = load(NodeRules, desk.rules, 0).step
     if what == ODOMETRY:
         sample = load(OdometrySample, desk.sample, 0)
-        store(desk.known, 0, step.take_odometry(known, desk.memory(), rules, sample))
+        step.take_odometry(desk.known, desk.memory(), rules, sample)
         return 0
     if what == FRAME:
-        return _moved_on(desk, _take_frame(desk, known, rules), reasons, now_ns)
-    return _moved_on(desk, _take_sighting(desk, known, rules), reasons, now_ns)
+        return _moved_on(desk, _take_frame(desk, rules), reasons, now_ns)
+    return _moved_on(desk, _take_sighting(desk, rules), reasons, now_ns)
 
 
 @kernel

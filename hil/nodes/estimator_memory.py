@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.consistency.process_estimate import Member
+from estimation.consistency.filter_bank import Member
 from estimation.consistency.slip_estimate import BANK
 from estimation.filters.filter import Filter
 from estimation.own_motion.odometry_check import OdometrySample, WayEntry
@@ -286,6 +286,12 @@ class EstimatorMemory:
     def history(self) -> History:
         """Odometry, oldest first."""
         return tuple(_held(MotionSample, self.desk.history, self.known.odometry))
+
+    @property
+    def ways(self) -> tuple[WayEntry, ...]:
+        """Ways of odometry and the follower's own track, oldest first, where both are known."""
+        check = self.known.odometry_check
+        return tuple(_held(WayEntry, self.desk.ways, check.entries)[: check.paired])
 
     @property
     def receipts(self) -> tuple[Receipt, ...]:

@@ -1,31 +1,26 @@
 """The estimator's step on plain records: a frame, a sighting or odometry in, and the track moves on.
 
-All that the estimator knows lies in rows that its owner keeps (:class:`Memory`) and in one record that is
-handed from step to step (:class:`Known`). Live daemons, lockstep, replay and sweeps call these functions.
+All that the estimator knows lies in rows that its owner keeps: those of :class:`Memory`, and one row of
+:class:`Known`, of which a step changes what has changed and leaves the rest alone. Live daemons, lockstep,
+replay and sweeps call these functions.
 """
 
 from __future__ import annotations
 
 from estimation.consistency.noise_estimate import (
     Moment,
-    is_another,
-    noise_with_frame,
-    noise_with_sighting,
     scaled_noise,
 )
 from estimation.consistency.process_estimate import (
-    LearnedProcess,
     learn,
     learned_noise,
     restarted,
-    unlearned,
 )
-from estimation.consistency.slip_estimate import learn_slip
+from estimation.consistency.slip_estimate import LearnedSlip, learn_slip
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import (
     Measurement,
     PairSeen,
-    PoseNoise,
     measure_body_anchored,
     measure_body_from_mocap,
     measure_world,
@@ -41,15 +36,15 @@ from estimation.own_motion.odometry_history import (
     sample_place,
     time_constant_of,
 )
+from estimation.own_motion.odometry_noise import noise_with_sample
 from estimation.own_motion.own_track import folded, motion_of, own_place, own_point, own_predicted
 from estimation.tracking.estimate import estimate_at, guessed_when_slow
 from estimation.tracking.follower_check import BELIEVED, MOUNT
 from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
 from estimation.tracking.follower_check import GATED as LEADER_OFF
-from estimation.tracking.manoeuvre import steady
-from estimation.tracking.mount_check import is_off
+from estimation.tracking.mount_check import MountCheck, is_off
 from estimation.tracking.mount_check import watched as mount_watched
-from estimation.tracking.track_point import DUPLICATE, GATED, LATE, RESTARTED, USED, TrackPoint
+from estimation.tracking.track_point import DUPLICATE, GATED, LATE, RESTARTED, USED, TrackPoint, with_motion
 from estimation.tracking.tracker import (
     INITIALISING,
     REJECTING,
@@ -61,12 +56,11 @@ from estimation.tracking.tracker import (
     point_at,
     reprocessed,
     status_of,
-    with_motion,
 )
-from estimation.tracking.travel_watch import watched
+from estimation.tracking.travel_watch import TravelWatch, watched
 from formation.kernel import kernel
 from formation.mount import robot_pose
-from formation.records import Rows, store
+from formation.records import Rows, load, store, within
 from formation.ring import place
 from hil.nodes.estimator_records import (
     AUTO,
@@ -80,6 +74,7 @@ from hil.nodes.estimator_records import (
     Taken,
     Told,
 )
+from hil.nodes.noise_step import learn_noise, with_noise
 from hil.nodes.own_motion_step import (
     answered_sample,
     by_either,
@@ -93,7 +88,6 @@ from hil.nodes.own_motion_step import (
     way_known,
     with_answer,
     with_judged_odometry,
-    with_odometry_noise,
 )
 
 _NS = 1e-9
@@ -112,76 +106,32 @@ def with_robot(seen: PairSeen, rules: MountRules) -> PairSeen:
 
 
 @kernel
-def take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
-    """Take in a mocap frame that was captured at a time by the host's clock.
+def take_frame(knowns: Rows[Known], memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
+    """Take in a mocap frame that was captured at a time by the host's clock, into the one row of ``knowns``.
 
     It is taken with the noise as known from the frames before, and keeps that if it is folded again.
     """
     learns = rules.noise_learning.learns
+    known = load(Known, knowns, 0)
+    begun = known.process.begun
     using = with_noise(rules, scaled_noise(rules.noise, known.noise)) if learns else rules
-    taken = _take_frame(known, memory, using, capture_ns, seen)
+    taken = _take_frame(knowns, memory, using, capture_ns, seen)
     if taken.late or taken.verdict == DUPLICATE or taken.verdict == LATE:
         return taken
-    after = taken.known
     # An outlier of the follower may be one by a wrong mount.
     if taken.cause == BELIEVED or taken.cause == LEADER_OFF or taken.cause == FOLLOWER_OFF:
-        jumped = taken.verdict == RESTARTED
-        check = mount_watched(after.mount_check, capture_ns, seen.follower, using.noise, jumped)
-        after = after._replace(mount_check=check)
+        jumped, checks = taken.verdict == RESTARTED, within(Known, knowns, 0, "mount_check")
+        check = load(MountCheck, checks, 0)
+        store(checks, 0, mount_watched(check, capture_ns, seen.follower, using.noise, jumped))
     if learns:
-        gated = taken.cause != BELIEVED
-        learned = noise_with_frame(known.noise, Moment(capture_ns, seen), gated, rules.noise_learning)
-        after = after._replace(noise=learned)
-        if is_another(learned):
-            after = _on_other_noise(after, memory, rules)
-        elif after.process.begun and not known.process.begun:
-            after = _on_this_noise(after)
-    return taken._replace(known=after)
+        begins = load(Known, knowns, 0).process.begun and not begun
+        learn_noise(knowns, memory, rules, Moment(capture_ns, seen), taken.cause != BELIEVED, begins)
+    return taken
 
 
 @kernel
-def _on_other_noise(known: Known, memory: Memory, rules: Rules) -> Known:
-    """The same where the noise turns out to be another one than all rests on that was learned before.
-
-    How the leader drives was weighed against that, and of a larger noise the belief is less certain. A track
-    that has settled is not waited for again.
-    """
-    points, ring, noise = memory.points, known.track, known.noise
-    if ring.length > 0 and noise.scale.position > noise.basis:
-        by, point = noise.scale.position / noise.basis, newest(points, ring)
-        wider = rules.filter.widened(point.belief, by * by)
-        # Innovations that leaned to one side were noise.
-        point = point._replace(belief=wider, manoeuvre=steady())
-        store(points, place(ring, points, ring.length - 1), point)
-    process = unlearned(known.process, memory.bank, rules.process_learning)
-    return _on_this_noise(known._replace(process=process))
-
-
-@kernel
-def _on_this_noise(known: Known) -> Known:
-    """The same, all that is learned from now on resting on the noise as it is known now."""
-    noise = known.noise
-    return known._replace(noise=noise._replace(basis=noise.scale.position))
-
-
-@kernel
-def with_sight_noise(taken: Taken, memory: Memory, rules: Rules) -> Taken:
-    """The same with what a sighting that came in order tells of the sensor's noise."""
-    unused = taken.verdict == DUPLICATE or taken.verdict == LATE
-    if not rules.noise_learning.learns or taken.late or unused:
-        return taken
-    learned = noise_with_sighting(taken.known.noise, newest(memory.points, taken.known.track))
-    return taken._replace(known=taken.known._replace(noise=learned))
-
-
-@kernel
-def with_noise(rules: Rules, noise: PoseNoise) -> Rules:
-    """Rules by which poses have this noise."""
-    return rules._replace(noise=noise, own_noise=rules.own_noise._replace(pose=noise))
-
-
-@kernel
-def _take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
+def _take_frame(knowns: Rows[Known], memory: Memory, rules: Rules, capture_ns: int, seen: PairSeen) -> Taken:
+    known = load(Known, knowns, 0)
     due = due_pose(known, memory, rules, capture_ns, seen)
     if rules.source == ODOMETRY:
         motion = by_odometry(known, memory, rules, capture_ns)
@@ -191,7 +141,7 @@ def _take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, see
         motion = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
         if known.own.length > 0 and capture_ns < own_point(memory.own, known.own, 0).capture_ns:
             motion = by_odometry(known, memory, rules, capture_ns)
-    taken = take(known, memory, rules, measured(rules, capture_ns, seen, motion))
+    taken = take(knowns, memory, rules, measured(rules, capture_ns, seen, motion))
     if rules.source == ODOMETRY:
         return taken
     # A follower's pose that is not believed must not move its own track either.
@@ -200,16 +150,18 @@ def _take_frame(known: Known, memory: Memory, rules: Rules, capture_ns: int, see
     believed = believed or (rules.source == AUTO and taken.cause == FOLLOWER_OFF)
     if taken.verdict == DUPLICATE or taken.verdict == LATE or not believed:
         return taken
-    own = folded(memory.own, taken.known.own, due, rules.own_noise, rules.settings.window)
-    after = taken.known._replace(own=own)
+    own = folded(memory.own, known.own, due, rules.own_noise, rules.settings.window)
+    store(within(Known, knowns, 0, "own"), 0, own)
     if taken.late:
+        after = load(Known, knowns, 0)
         first = place_of(memory.points, after.track, capture_ns)
         _with_own_motion(after, memory, rules, first)
         reprocessed(memory.points, after.track, first, rules.settings, rules.filter)
     if rules.source == AUTO:
-        since_ns = after.watched_ns if after.watched_ns > 0 else capture_ns
-        after = with_judged_odometry(after, memory, rules)._replace(watched_ns=since_ns)
-    return taken._replace(known=after)
+        with_judged_odometry(knowns, memory, rules)
+        if known.watched_ns <= 0:
+            store(knowns, 0, load(Known, knowns, 0)._replace(watched_ns=capture_ns))
+    return taken
 
 
 @kernel
@@ -225,8 +177,9 @@ def measured(rules: Rules, capture_ns: int, seen: PairSeen, motion: FollowerMoti
 
 
 @kernel
-def take(known: Known, memory: Memory, rules: Rules, measurement: Measurement) -> Taken:
-    """Take in a measurement of the leader."""
+def take(knowns: Rows[Known], memory: Memory, rules: Rules, measurement: Measurement) -> Taken:
+    """Take in a measurement of the leader, into the one row of ``knowns``."""
+    known = load(Known, knowns, 0)
     points, ring = memory.points, known.track
     late = ring.length > 0 and measurement.capture_ns < capture_at(points, ring, ring.length - 1)
     before = place_of(points, ring, measurement.capture_ns)
@@ -236,19 +189,22 @@ def take(known: Known, memory: Memory, rules: Rules, measurement: Measurement) -
         estimator = estimator.driven_by(learned_noise(known.process, learning))
     added = add(points, ring, measurement, rules.settings, estimator)
     cause = added.cause if added.verdict == GATED else BELIEVED
-    known = known._replace(track=added.ring)
+    store(within(Known, knowns, 0, "track"), 0, added.ring)
     if late and measurement.has_way and added.verdict != DUPLICATE and added.verdict != LATE:
-        _shorten_way(known, memory, rules, measurement.capture_ns)
+        _shorten_way(load(Known, knowns, 0), memory, rules, measurement.capture_ns)
     if learning.on and not late:
-        known = known._replace(process=_learned(known, memory, rules, added.verdict))
+        _learn(knowns, memory, rules, added.verdict)
     if rules.learns_slip and not late and added.ring.length > 1:
         # Of the newest odometry may still come; the one before it has been folded with all there is.
         settled = point_at(points, added.ring, added.ring.length - 2)
-        known = known._replace(slip=learn_slip(known.slip, memory.bank, settled, rules.filter))
+        slips = within(Known, knowns, 0, "slip")
+        store(slips, 0, learn_slip(load(LearnedSlip, slips, 0), memory.bank, settled, rules.filter))
     if rules.filter.in_world and not late:
         point, settings = newest(points, added.ring), rules.settings
-        known = known._replace(travel=watched(known.travel, point, settings.lost_after, rules.filter.limits))
-    return Taken(known, added.verdict, cause, late)
+        travels = within(Known, knowns, 0, "travel")
+        travel = load(TravelWatch, travels, 0)
+        store(travels, 0, watched(travel, point, settings.lost_after, rules.filter.limits))
+    return Taken(added.verdict, cause, late)
 
 
 @kernel
@@ -261,62 +217,70 @@ def _shorten_way(known: Known, memory: Memory, rules: Rules, capture_ns: int) ->
         reprocessed(points, ring, k, rules.settings, rules.filter)
 
 
-@kernel
-def _learned(known: Known, memory: Memory, rules: Rules, verdict: int) -> LearnedProcess:
-    """What is known of the leader's driving with the newest point of its track in it."""
+@kernel(inline=False)
+def _learn(knowns: Rows[Known], memory: Memory, rules: Rules, verdict: int) -> None:
+    """Learn of the leader's driving from the newest point of its track."""
+    known, processes = load(Known, knowns, 0), within(Known, knowns, 0, "process")
     if verdict == RESTARTED:
-        return restarted(known.process)
+        store(processes, 0, restarted(known.process))
     if verdict != USED:
-        return known.process
+        return
     point = newest(memory.points, known.track)
     if point.period > SELDOM:
-        return known.process
+        return
     if point.measurement.has_way and rules.trust.lag > 0.0:
         # Where commands stand in for motion, what is seen across the line of sight tells how the follower
         # obeys, not how the leader drives.
         point = point._replace(measurement=seen_in_range(point.measurement))
-    return learn(known.process, memory.bank, point, rules.process_learning, rules.filter)
+    learned = learn(known.process, memory.bank, point, rules.process_learning, rules.filter)
+    store(processes, 0, learned)
 
 
 @kernel
-def _with_checked(known: Known, memory: Memory, rules: Rules, told: OdometrySample) -> Known:
-    """Known with a sample of odometry in its check, and in what is found of its noise."""
+def _check(knowns: Rows[Known], memory: Memory, rules: Rules, told: OdometrySample) -> None:
+    """Take a sample of odometry into its check, and into what is found of its noise."""
+    known = load(Known, knowns, 0)
     check = known.odometry_check
     known = with_answer(known, rules, told)
+    store(within(Known, knowns, 0, "answer"), 0, known.answer)
     told = answered_sample(known, rules, told)
     if check.heard and finds_odometry_noise(rules):
-        known = with_odometry_noise(known, check.last, told, rules)
-    known = known._replace(odometry_check=with_sample(check, memory.ways, told, rules.own_noise))
-    if known.own.length == 0:
-        return known
-    learns = rules.noise_learning.learns
-    seen = with_noise(rules, scaled_noise(rules.noise, known.noise)) if learns else rules
-    return with_judged_odometry(known, memory, seen)
+        noise = noise_with_sample(known.odometry_noise, check.last, told, rules.trust, rules.own_noise)
+        store(within(Known, knowns, 0, "odometry_noise"), 0, noise)
+    checked = with_sample(check, memory.ways, told, rules.own_noise)
+    store(within(Known, knowns, 0, "odometry_check"), 0, checked)
+    if known.own.length > 0:
+        learns = rules.noise_learning.learns
+        seen = with_noise(rules, scaled_noise(rules.noise, known.noise)) if learns else rules
+        with_judged_odometry(knowns, memory, seen)
 
 
 @kernel
-def take_odometry(known: Known, memory: Memory, rules: Rules, told: OdometrySample) -> Known:
+def take_odometry(knowns: Rows[Known], memory: Memory, rules: Rules, told: OdometrySample) -> None:
     """Take in a sample of odometry, and fold again what came after the sample before it."""
     sample = MotionSample(told.stamp_ns, told.v2, told.u2, 0.0, 0.0)
     if rules.source == AUTO:
+        known = load(Known, knowns, 0)
         check = known.odometry_check
         if source_now(known, rules) == POSE and told.has_pose and check.last.has_pose:
             sample = by_pose(check.last, told)
-        known = _with_checked(known, memory, rules, told)
+        _check(knowns, memory, rules, told)
+    known = load(Known, knowns, 0)
     ring = remember(memory.history, known.odometry, sample, rules.span)
     time_constant = time_constant_of(rules.trust, known.correction)
     if time_constant > 0.0:
         answer_again(memory.history, ring, sample.stamp_ns, time_constant)
+    store(within(Known, knowns, 0, "odometry"), 0, ring)
     known = known._replace(odometry=ring)
     n = known.track.length
     if not rules.reprocesses or n == 0 or source_now(known, rules) == TRACK:
-        return known
+        return
     k, since_ns = sample_place(memory.history, ring, sample.stamp_ns), 0
     if k > 0:
         before = sample_at(memory.history, ring, k - 1)
         since_ns = before.stamp_ns + delay_ns(rules.trust, known.correction) + 1
     if capture_at(memory.points, known.track, n - 1) < since_ns:
-        return known
+        return
     first = place_of(memory.points, known.track, since_ns)
     if rules.source == FUSED:
         own_again(known, memory, rules, since_ns)
@@ -325,7 +289,6 @@ def take_odometry(known: Known, memory: Memory, rules: Rules, told: OdometrySamp
         changed = _with_odometry(known, memory, rules, first)
     if changed:
         reprocessed(memory.points, known.track, first, rules.settings, rules.filter)
-    return known
 
 
 @kernel

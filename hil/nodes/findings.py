@@ -23,7 +23,7 @@ ADVICE = {
     "odometry_not_finite": "look at the driver that publishes it: what is no number is not used",
     "odometry_late": "check the clock of the robot and its link, or set estimator.align_odometry = true",
     "odometry_reset": "find out what restarted the robot's base; its pose counts from a new origin now",
-    "frame_yaw": "set follower.mount to what abreast calibrate prints, or turn the body to the front",
+    "frame_yaw": "set the mount to what abreast calibrate prints, or turn the body to the front",
     "frame_pivot": "set the mount to what abreast calibrate prints, or its pivot between the wheels",
     "axes": "set which way is up in what brings the poses: z is to point up",
     "unit": "have positions sent in metres, or scale them in what brings them",

@@ -6,7 +6,14 @@ from estimation.consistency.slip_estimate import with_slip
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import Measurement, PairSeen
 from estimation.own_motion.interval_motion import motion_between
-from estimation.own_motion.judged_odometry import age_of, aged, fresh_for, is_better, with_own_track
+from estimation.own_motion.judged_odometry import (
+    age_of,
+    aged,
+    contradicts,
+    fresh_for,
+    is_better,
+    with_own_track,
+)
 from estimation.own_motion.odometry_check import (
     POSE,
     TRACK,
@@ -23,7 +30,7 @@ from estimation.own_motion.odometry_history import (
     scaled_motion,
     time_constant_of,
 )
-from estimation.own_motion.odometry_noise import noise_with_sample, noise_with_window, with_found_noise
+from estimation.own_motion.odometry_noise import noise_with_window, with_found_noise
 from estimation.own_motion.own_track import (
     OwnPoint,
     motion_of,
@@ -36,7 +43,7 @@ from estimation.own_motion.own_track import (
 )
 from estimation.tracking.tracker import capture_at
 from formation.kernel import kernel
-from formation.records import store
+from formation.records import Rows, load, store, within
 from formation.ring import place
 from hil.nodes.estimator_records import AUTO, FUSED, MOCAP, ODOMETRY, Known, Memory, Rules
 
@@ -145,43 +152,59 @@ def is_fresh(known: Known, rules: Rules, capture_ns: int) -> bool:
 
 
 @kernel
+def _either(motion: FollowerMotion, fresh: bool, own: OwnPoint, rules: Rules) -> FollowerMotion:
+    """Motion by odometry while that is fresh and no pose speaks against it, else by what is known better."""
+    shown = motion_of(own)
+    if fresh:
+        return shown if contradicts(motion, own) else motion
+    return shown if is_better(shown, motion, rules.own_noise) else motion
+
+
+@kernel
 def by_either(known: Known, memory: Memory, rules: Rules, due: OwnPoint) -> FollowerMotion:
-    """Motion at a pose that is due: by odometry while that is fresh, else by what is known better."""
+    """Motion at a pose that is due: by odometry, or by the follower's own track."""
     motion = _fresh_odometry(known, memory, rules, due.capture_ns)
-    if is_fresh(known, rules, due.capture_ns):
+    fresh = is_fresh(known, rules, due.capture_ns)
+    ring = known.own
+    # What the newest point has nothing against need not cost a step of the track's filter.
+    if fresh and (ring.length == 0 or not contradicts(motion, own_point(memory.own, ring, ring.length - 1))):
         return motion
-    own = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
-    return own if is_better(own, motion, rules.own_noise) else motion
+    return _either(motion, fresh, own_predicted(memory.own, ring, due, rules.own_noise), rules)
 
 
 @kernel
 def by_either_at(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
     """The same at a point of the follower's own track, which may not have it."""
     motion = _fresh_odometry(known, memory, rules, capture_ns)
-    if is_fresh(known, rules, capture_ns):
-        return motion
     at = own_place(memory.own, known.own, capture_ns)
     if at == known.own.length:
         return motion
     point = own_point(memory.own, known.own, at)
-    own = motion_of(point)
-    return own if point.capture_ns == capture_ns and is_better(own, motion, rules.own_noise) else motion
+    if point.capture_ns != capture_ns:
+        return motion
+    return _either(motion, is_fresh(known, rules, capture_ns), point, rules)
 
 
 @kernel
-def with_judged_odometry(known: Known, memory: Memory, rules: Rules) -> Known:
-    """Known with what the follower's own track has to say of odometry, and of how far it is off."""
+def with_judged_odometry(knowns: Rows[Known], memory: Memory, rules: Rules) -> None:
+    """Take in what the follower's own track has to say of odometry, and of how far it is off."""
+    if awaits_track(load(Known, knowns, 0).odometry_check):
+        _judge_odometry(knowns, memory, rules)
+
+
+@kernel(inline=False)
+def _judge_odometry(knowns: Rows[Known], memory: Memory, rules: Rules) -> None:
+    known = load(Known, knowns, 0)
     before = known.odometry_check
-    if not awaits_track(before):
-        return known
     after = with_own_track(before, memory.ways, memory.own, known.own, rules.own_noise, _trust(known, rules))
-    known = known._replace(odometry_check=after)
+    store(within(Known, knowns, 0, "odometry_check"), 0, after)
     if not finds_odometry_noise(rules) or not before.windowed or not after.windowed:
-        return known
-    if after.since.stamp_ns <= before.since.stamp_ns:
-        return known
-    noise = noise_with_window(known.odometry_noise, before.since, after.since, rules.trust, rules.own_noise)
-    return known._replace(odometry_noise=noise)
+        return
+    if after.since.stamp_ns > before.since.stamp_ns:
+        noise = noise_with_window(
+            known.odometry_noise, before.since, after.since, rules.trust, rules.own_noise
+        )
+        store(within(Known, knowns, 0, "odometry_noise"), 0, noise)
 
 
 @kernel
@@ -191,19 +214,12 @@ def finds_odometry_noise(rules: Rules) -> bool:
 
 
 @kernel
-def with_odometry_noise(known: Known, last: OdometrySample, told: OdometrySample, rules: Rules) -> Known:
-    """Known with what a sample that follows on another tells of odometry's noise."""
-    noise = noise_with_sample(known.odometry_noise, last, told, rules.trust, rules.own_noise)
-    return known._replace(odometry_noise=noise)
-
-
-@kernel
 def take_not_finite(known: Known, now_ns: int) -> Known:
     """Take note of odometry that came with a number that is none."""
     return known._replace(odometry_check=known.odometry_check._replace(bad_ns=now_ns))
 
 
-@kernel
+@kernel(inline=False)
 def own_again(known: Known, memory: Memory, rules: Rules, since_ns: int) -> None:
     """Fold the follower's own track anew from a time on, with the odometry that is now known at its poses."""
     ring, noise = known.own, rules.own_noise

@@ -12,7 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from estimation.calibration.mounts import NOTHING_FOUND, FoundMount, WheelSpeed, find_mount
+from estimation.calibration.mounts import (
+    NOTHING_FOUND,
+    FoundMount,
+    WheelSpeed,
+    find_mount,
+    short_drive_mount,
+)
+from estimation.models.measurement import PoseNoise
 from estimation.time.host_time import NO_TIME_YET, time_rows
 from formation.angles import FloatArray
 from formation.mount import Mount
@@ -23,7 +30,7 @@ from hil.log.metadata import IMPORT, mode_of
 from hil.log.reader import Log
 from hil.nodes.frame_time import time_of, time_rules
 from hil.nodes.refusals import NOT_REFUSED
-from hil.scenario.leader_model import follower_mount, leader_mount
+from hil.scenario.leader_model import follower_mount, leader_mount, pose_noise
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.message_checks import planar
@@ -104,8 +111,9 @@ def mounts_of_events(
     zero_ns = 0 if absolute else min(motions or tracks.follower, default=0)
     begin_ns = -1 if from_s is None else zero_ns + round(from_s * 1e9)
     end_ns = 2**63 if to_s is None else zero_ns + round(to_s * 1e9)
+    noise = pose_noise(scenario)
     leader, follower = (
-        _found({at_ns: pose for at_ns, pose in poses.items() if begin_ns <= at_ns <= end_ns}, speeds)
+        _found({at_ns: pose for at_ns, pose in poses.items() if begin_ns <= at_ns <= end_ns}, speeds, noise)
         for poses, speeds in (
             (tracks.leader, tracks.leader_speed),
             (tracks.follower, tracks.follower_speed),
@@ -151,7 +159,7 @@ def body_tracks(events: Iterable[Timed], scenario: Scenario) -> BodyTracks:
     return tracks
 
 
-def _found(poses: dict[int, Pose], speeds: dict[int, float]) -> FoundMount:
+def _found(poses: dict[int, Pose], speeds: dict[int, float], noise: PoseNoise) -> FoundMount:
     """Mount by poses and what wheels tell of the speed; nothing of a body that has no orientation."""
     if len(poses) < 2:
         return NOTHING_FOUND
@@ -164,7 +172,10 @@ def _found(poses: dict[int, Pose], speeds: dict[int, float]) -> FoundMount:
     wheels = WheelSpeed(_seconds(told, zero_ns), np.array([speeds[at_ns] for at_ns in told]))
     finite = np.isfinite(wheels.v)
     wheels = WheelSpeed(wheels.t[finite], wheels.v[finite])
-    return find_mount(_seconds(stamps, zero_ns), track, wheels if len(wheels.t) else None)
+    found = find_mount(_seconds(stamps, zero_ns), track, wheels if len(wheels.t) else None)
+    if found != NOTHING_FOUND:
+        return found
+    return short_drive_mount(stamps, [poses[at_ns] for at_ns in stamps], noise)
 
 
 def _seconds(stamps_ns: list[int], zero_ns: int) -> FloatArray:

@@ -119,14 +119,18 @@ def true_states(flown: Flown, k: int, span: Span) -> TrueStates:
     rows = flown.truth[k :: flown.pairs]
     moments_ns = rows["at_ns"] - flown.since_ns
     rows = rows[np.searchsorted(moments_ns, span.from_ns) : np.searchsorted(moments_ns, span.to_ns, "right")]
-    recorded = np.column_stack([rows[body][name] for body, name in _TRUE])
+    recorded = np.empty((len(_TRUE), len(rows))).T
+    for column, (body, name) in enumerate(_TRUE):
+        recorded[:, column] = rows[body][name]
     return TrueStates.along(rows["at_ns"] - flown.since_ns, recorded)
 
 
 def _estimates(flown: Flown, k: int) -> EstimateColumns:
     rows = flown.estimates if flown.pairs == 1 else flown.estimates[flown.estimates["follower"] == k]
     found = rows["estimate"]
-    variances = np.column_stack([found["joint"][name] for name in _VARIANCES])
+    variances = np.empty((len(_VARIANCES), len(found))).T
+    for column, name in enumerate(_VARIANCES):
+        variances[:, column] = found["joint"][name]
     return EstimateColumns(
         capture_ns=found["capture_ns"] - flown.since_ns,
         status=found["status"].copy(),
@@ -138,7 +142,10 @@ def _estimates(flown: Flown, k: int) -> EstimateColumns:
 
 
 def _rows(truth: TrueStates, rows: NDArray[np.int64]) -> TrueStates:
-    return TrueStates(**{name: getattr(truth, name)[rows] for name in TrueStates.__slots__})
+    taken: NDArray[np.int64] | slice = rows
+    if len(rows) and rows[-1] - rows[0] == len(rows) - 1 and np.all(np.diff(rows) == 1):
+        taken = slice(int(rows[0]), int(rows[-1]) + 1)  # where no frame was lost: that copies nothing
+    return TrueStates(**{name: getattr(truth, name)[taken] for name in TrueStates.__slots__})
 
 
 def _add_estimates(tally: NDArray[np.void], scenario: Scenario, columns: Columns, flown: Flown) -> None:

@@ -7,9 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from estimation.calibration.mounts import NOTHING_FOUND, FoundMount, WheelSpeed, find_mount
+from estimation.calibration.mounts import (
+    NOTHING_FOUND,
+    FoundMount,
+    WheelSpeed,
+    find_mount,
+    short_drive_mount,
+)
+from estimation.models.measurement import PoseNoise
 from formation.angles import FloatArray, wrap
 from formation.mount import Mount
+from formation.pose import Pose
 
 MOUNT = Mount(0.05, -0.02, 0.3)
 STEP = 1.0 / 1200.0
@@ -122,3 +130,25 @@ def test_gaps_and_slow_frames_are_no_hindrance() -> None:
 def test_what_is_not_known_is_taken_from_before() -> None:
     before = Mount(0.1, 0.2, 0.3)
     assert FoundMount(0.5, None, None, (1e-3, None, None)).mount(before) == Mount(0.5, 0.2, 0.3)
+
+
+def short_drive(seconds: float, seed: int = 0) -> FoundMount:
+    t, poses, _ = drive(seed, seconds=seconds)
+    stamps = [round(1e9 * at) for at in t.tolist()]
+    return short_drive_mount(stamps, [Pose(*row) for row in poses.tolist()], PoseNoise(3e-4, 3.6e-3))
+
+
+def test_three_seconds_tell_yaw_and_what_is_ahead_but_not_beside() -> None:
+    found = [short_drive(3.5, seed) for seed in range(20)]
+    assert find_mount(*drive(0, seconds=3.5)[:2]) == NOTHING_FOUND
+    off = np.array([errors(each)[0] for each in found])
+    sds = np.array([errors(each)[1] for each in found])
+    assert np.all(np.isnan(off[:, 1]))
+    assert np.nanmax(sds[:, 2]) < math.radians(2.0)
+    scores = (off / sds)[:, [0, 2]]
+    assert np.sqrt(np.nanmean(np.square(scores))) < 1.5
+    assert np.isfinite(scores).mean() > 0.9
+
+
+def test_a_drive_of_a_second_tells_nothing() -> None:
+    assert short_drive(1.0) == NOTHING_FOUND

@@ -23,7 +23,7 @@ from estimation.models.measurement import (
 from estimation.tracking.estimate import Estimate, estimate_at
 from estimation.tracking.follower_check import Cause
 from estimation.tracking.track import Track, Tracker
-from estimation.tracking.track_point import SAME_NS, JumpUncertainty, TrackPoint, Verdict
+from estimation.tracking.track_point import SAME_NS, JumpUncertainty, TrackPoint, Verdict, with_motion
 from estimation.tracking.tracker import (
     Status,
     TrackSettings,
@@ -34,7 +34,6 @@ from estimation.tracking.tracker import (
     point_at,
     reprocessed,
     status_of,
-    with_motion,
 )
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance

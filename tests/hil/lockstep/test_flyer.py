@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from operator import attrgetter
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from controllers.guard import reason_of
 from estimation.tracking.estimate import Joint
@@ -15,6 +17,8 @@ from hil.errors import CheckFailedError
 from hil.lockstep.flyer import Flown, Flyer
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import read_log
+from hil.nodes.controller import ControllerNode
+from hil.nodes.estimator import EstimatorNode
 from hil.scenario.files import load_scenario
 from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
@@ -180,6 +184,23 @@ def test_what_is_on_its_way_may_be_more_than_there_was_room_for() -> None:
     first = Flyer(crowded)
     first.fly(SEED)
     assert len(first.rooms.lab.underway) > 64
+
+
+@pytest.mark.parametrize("rate", [1.0, 30.0, 97.0, 120.0, 333.0, 1000.0])
+def test_rings_have_a_power_of_two_of_rows(rate: float) -> None:
+    told = [f"mocap.rate_hz={rate}", f"robot.odometry_rate_hz={rate}", "controller.max_age_s=0.77"]
+    scenario = scenario_of("turtlebot3", told)
+    rooms, desk = Flyer(scenario).rooms, EstimatorNode(scenario).rows_only(0).memory.desk
+    flown = (rooms.points, rooms.history, rooms.own, rooms.ways, rooms.sent, rooms.lab.underway)
+    live = (
+        desk.points,
+        desk.history,
+        desk.own,
+        desk.ways,
+        ControllerNode(scenario).rows_only(0).desk.commands,
+    )
+    for rows in (*flown, *live):
+        assert len(cast("NDArray[np.void]", rows)).bit_count() == 1
 
 
 def test_a_leader_that_never_sets_off_is_an_error() -> None:

@@ -13,6 +13,7 @@ from formation.mount import Mount, body_pose
 from formation.pose import Pose, advance
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import Log, read_log
+from hil.nodes.leader_mount import UNWATCHED, with_leader
 from hil.nodes.mount_report import mount_findings, mount_problem, mount_report
 from hil.scenario.files import load_scenario
 from hil.wire import topics
@@ -100,3 +101,34 @@ def test_warned_of_or_set_right_it_drives_on(tmp_path: Path) -> None:
         }
         assert REASON not in reasons
         assert ("finding.frame_yaw" in last_report(log)) is said
+
+
+def test_the_leaders_mount_and_the_followers_place_beside_its_axis_are_named_live(tmp_path: Path) -> None:
+    given = ["run.duration_s=12", "mocap.leader_mount=[0.03, 0, 0.2]", "mocap.follower_mount=[0, 0.04, 0]"]
+    run_lockstep(load_scenario("turtlebot3", given), tmp_path / "run.mcap")
+    report = last_report(read_log(tmp_path / "run.mcap"))
+    for name, true in (("leader_yaw", 0.2 * 180.0 / math.pi), ("leader_x", 30.0), ("y", 40.0)):
+        unit = "deg" if name == "leader_yaw" else "mm"
+        sd = float(report[f"mount.{name}_sd_{unit}"])
+        assert float(report[f"mount.{name}_{unit}"]) == pytest.approx(true, abs=5.0 * sd)
+    assert report["finding.frame_yaw"].startswith("the leader's heading is +11.")
+    assert "the leader's body sits +" in report["finding.frame_pivot"]
+    assert "further left of the wheels' middle than follower.mount says" in report["finding.frame_pivot"]
+    # Nobody is stopped for what the leader's body does.
+    assert report["status"] == "tracking"
+
+
+def test_a_leader_whose_heading_never_changes_has_none() -> None:
+    watch, pose, noise = UNWATCHED, Pose(0.0, 0.0, 1.0), PoseNoise(3e-4, 3.5e-3)
+    for k in range(600):
+        pose = advance(pose, 0.1, 0.6 * math.sin(0.02 * k), 1.0 / 120.0)
+        at_ns = round(1e9 * k / 120)
+        watch = with_leader(watch, at_ns, Pose(pose.x, pose.y, 0.0), Mount(0.0, 0.0, 0.0), noise)
+    assert mount_report(NO_MOUNT_CHECK, watch.check) == {}
+    turning, pose = UNWATCHED, Pose(0.0, 0.0, 1.0)
+    for k in range(600):
+        pose = advance(pose, 0.1, 0.6 * math.sin(0.02 * k), 1.0 / 120.0)
+        known = Mount(0.02, -0.01, 0.4)
+        turning = with_leader(turning, round(1e9 * k / 120), body_pose(pose, known), known, noise)
+    assert mount_report(NO_MOUNT_CHECK, turning.check)["mount.leader_yaw_deg"] == pytest.approx(0.0, abs=0.1)
+    assert mount_findings(NO_MOUNT_CHECK, turning.check) == {}

@@ -11,6 +11,7 @@ import pytest
 from estimation.models.measurement import PairSeen
 from formation.angles import wrapped
 from formation.pose import Pose, advance
+from formation.records import load, row_of
 from hil.nodes import estimator_step as step
 from hil.nodes.estimator import EstimatorNode
 from hil.nodes.estimator_desk import NOTHING_KNOWN
@@ -33,7 +34,7 @@ def known_of(told: float, how: str) -> Known:
     }
     scenario = load_scenario("turtlebot3", given)
     rules, memory = rules_of(scenario), EstimatorNode(scenario).rows_only(0).memory.desk.memory()
-    random, known = np.random.default_rng(3), NOTHING_KNOWN
+    random, knowns = np.random.default_rng(3), row_of(NOTHING_KNOWN)
     leader, follower = Pose(0.0, 0.0, 0.0), Pose(0.0, -0.4, 0.0)
     for k in range(FRAMES):
         if k >= STANDS:
@@ -42,8 +43,8 @@ def known_of(told: float, how: str) -> Known:
         n = (random.standard_normal(5) * [*[SD_POSITION] * 4, SD_HEADING]).tolist()
         own = Pose(follower.x + n[2], follower.y + n[3], wrapped(follower.theta + n[4]))
         seen = PairSeen(leader.x + n[0], leader.y + n[1], own)
-        known = step.take_frame(known, memory, rules, 1_000_000_000 + k * FRAME_NS, seen).known
-    return known
+        step.take_frame(knowns, memory, rules, 1_000_000_000 + k * FRAME_NS, seen)
+    return load(Known, knowns, 0)
 
 
 @pytest.mark.parametrize("told", [1.0 / 3.0, 3.0])

@@ -18,10 +18,12 @@ from estimation.tracking.track_point import SAME_NS
 from estimation.tracking.tracker import TRACKING
 from formation.angles import wrapped
 from formation.pose import Pose, advance
+from formation.records import load, row_of
 from hil.nodes import estimator_step as step
 from hil.nodes.estimator import EstimatorNode
 from hil.nodes.estimator_desk import NOTHING_KNOWN
 from hil.nodes.estimator_memory import rules_of
+from hil.nodes.estimator_records import Known
 from hil.scenario.files import load_scenario
 
 FRAME_NS = 8_333_333
@@ -65,15 +67,15 @@ def estimates(sent: list[Sent], source: str) -> dict[int, tuple[float, float]]:
     """v1 and alpha1 of tracking estimates after every instant, by the frame's number; all else by default."""
     scenario = load_scenario("turtlebot3", {"estimator.own_motion": source})
     rules, memory = rules_of(scenario), EstimatorNode(scenario).rows_only(0).memory.desk.memory()
-    known, found = NOTHING_KNOWN, {}
+    knowns, found = row_of(NOTHING_KNOWN), {}
     for each in sent:
         if each.frame is not None:
-            known = step.take_frame(known, memory, rules, each.stamp_ns, each.frame).known
+            step.take_frame(knowns, memory, rules, each.stamp_ns, each.frame)
         elif each.odometry is not None:
             v2, u2, pose = each.odometry
-            known = step.take_odometry(
-                known, memory, rules, OdometrySample(each.stamp_ns, v2, u2, True, pose)
-            )
+            sample = OdometrySample(each.stamp_ns, v2, u2, True, pose)
+            step.take_odometry(knowns, memory, rules, sample)
+        known = load(Known, knowns, 0)
         if known.track.length == 0:
             continue
         estimate, _ = step.estimate(known, memory.points, rules, each.stamp_ns)

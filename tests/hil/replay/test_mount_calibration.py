@@ -89,6 +89,20 @@ def test_a_second_drive_with_the_found_mounts_is_as_good_as_one_without_any(
     assert left.follower.yaw == pytest.approx(FOLLOWER.yaw, abs=3e-3)
 
 
+def test_a_follower_that_was_stopped_for_its_mount_has_told_its_yaw(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = ["mocap.follower_mount=[0.05, 0.02, -0.5]", "run.duration_s=6", "controller.mount_check=stop"]
+    run_lockstep(load_scenario("turtlebot3", given), tmp_path / "stopped.mcap")
+    code, out, err = calibrated(capsys, tmp_path / "stopped.mcap", "--json")
+    assert code == 0
+    found = json.loads(out)["mounts"]["follower"]
+    assert found["yaw"] == pytest.approx(-0.5, abs=4.0 * found["sd"][2])
+    assert found["sd"][2] < 0.035
+    assert found["y"] is None
+    assert 'controller.mount_check = "warn"' in err
+
+
 def test_a_leader_without_orientation_has_no_mount_that_is_known(run_log: Path, tmp_path: Path) -> None:
     log = read_log(rewritten(run_log, tmp_path / "plain.mcap", spin=0.0))
     found = mounts_of_log(log, scenario_of())
