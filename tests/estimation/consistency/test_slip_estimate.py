@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from estimation.consistency.process_estimate import LANES, Member
+from estimation.consistency.filter_bank import LANES, Member
 from estimation.consistency.slip_estimate import (
     BANK,
     FORGOTTEN,
@@ -52,8 +52,8 @@ class Drive:
         self.place, self.t_ns = np.zeros(2), ZERO_NS
         first = sighted(self.generator, self.t_ns, RHO, 0.0)
         point = begun(first, self.estimator)
-        velocity = {"vx": 0.07, "vy": 0.0, "vx_vx": 1e-6, "vy_vy": 1e-6, "u_u": 1e-4}
-        self.point = point._replace(belief=point.belief._replace(**velocity), settled=True, verdict=USED)
+        known = point.belief._replace(vx=0.07, vy=0.0, vx_vx=1e-6, vy_vy=1e-6, u_u=1e-4)
+        self.point = point._replace(belief=known, settled=True, verdict=USED)
 
     def step(self, learned: LearnedSlip) -> TrackPoint:
         """The next point of the track, which takes the deviations of the way as they are found."""
