@@ -45,7 +45,7 @@ _TURNS = 100
 _BEYOND = 2e-4
 _WIDER = 1.004
 _TOUCH = 1e-6
-_LEAST = 1e-6
+_LEAST = 1e-8
 _SPARE = (1e-3, 2.5e-3, 6e-3)
 _PIECE = 3e-4
 _COARSE = Outline(2.5e-3, 2e-3)
@@ -186,9 +186,9 @@ def tube_radii(model: ErrorModel, aside: Aside, nearest: float) -> tuple[FloatAr
         return None
     fastest = fastest_ask(model, rho) + aside.dv
     radii = np.empty(_PLACES)
-    radii[0] = max(math.asin(moved[0] / aside.mu2) * (1.0 + _TOUCH), _LEAST)
+    radii[0] = math.asin(moved[0] / aside.mu2) * (1.0 + _TOUCH) + 2.0 * _LEAST
     for k in range(_PLACES - 1):
-        spare = aside.mu2 * math.sin(radii[k]) - moved[k]
+        spare = max(aside.mu2 * (math.sin(radii[k]) - _LEAST) - moved[k], 0.0)
         apart = model.v1 + max(fastest[k], fastest[k + 1]) * math.sin(radii[k])
         radii[k + 1] = radii[k] - (1.0 - _TOUCH) * step * spare / (apart + step * aside.mu2)
     tube = Tube(nearest, step, aside.dv)

@@ -234,6 +234,14 @@ def test_less_error_or_stiffer_steering_has_a_smaller_set(held: JointSet) -> Non
     assert clumsy.rho_min < smooth.rho_min < smooth.rho_max < clumsy.rho_max
 
 
+def test_truncated_commands_are_an_error_like_any_other() -> None:
+    """Speeds cut by 0.01 m/s, turn rates by 0.01 rad/s; the cut speed turns the line by v / rho besides."""
+    cut = 0.01
+    held = joint_set(MODEL._replace(W=0.005), Aside(2.0, dv=cut, du=0.09))
+    assert held is not None
+    assert cut + cut / held.rho_min < 0.09
+
+
 def test_what_cannot_be_held_is_not_claimed() -> None:
     robots = MODEL._replace(W=0.0205)
     assert joint_set(robots, ASIDE) is None
