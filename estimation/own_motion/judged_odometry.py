@@ -18,7 +18,7 @@ from estimation.own_motion.odometry_check import (
 )
 from estimation.own_motion.odometry_delay import delay_of, misfit_of, tight_variances
 from estimation.own_motion.odometry_history import InputTrust
-from estimation.own_motion.own_track import OwnNoise, OwnPoint, own_place, own_point
+from estimation.own_motion.own_track import OwnNoise, OwnPoint, motion_of, own_place, own_point
 from formation.angles import wrapped
 from formation.kernel import kernel
 from formation.pose import Pose
@@ -32,6 +32,7 @@ _QUADRUPLES = 4  # of poses that are looked at together
 _OFTEN = 0.025  # [s]; over four poses so far apart no robot shows a third difference
 _TRACK_HOLDS = 4.0  # variance over what is told of it
 _OUTLIER = 21.11  # chi-square quantile of 0.9999 with 3 degrees of freedom, of a pose off its track
+_RULED_OUT, _SLIP = 27.63, 0.1  # chi-square quantile of 0.999999 with 2 degrees of freedom
 _NS = 1e-9
 _FRESH = 2.0  # periods of odometry
 _FIRST_PERIOD = 0.1  # [s] that is taken for granted while a sample is the only one
@@ -202,6 +203,24 @@ def aged(motion: FollowerMotion, check: OdometryCheck, age: float, noise: OwnNoi
     sd_v = math.sqrt(motion.sd_v2 * motion.sd_v2 + noise.v_max * noise.v_max * over)
     sd_u = math.sqrt(motion.sd_u2 * motion.sd_u2 + noise.u_max * noise.u_max * over)
     return motion._replace(sd_v2=sd_v, sd_u2=sd_u)
+
+
+@kernel
+def contradicts(motion: FollowerMotion, own: OwnPoint) -> bool:
+    """Whether odometry tells another motion than the follower's own track has at the moment, beyond doubt.
+
+    A judgement takes two windows of half a second; until then nothing need be believed that poses rule out.
+    What counts are deviations of both and a tenth of the motion, as wheels slip; of a track whose newest pose
+    was no outlier.
+    """
+    if own.rejected > 0:
+        return False
+    shown = motion_of(own)
+    v, u = motion.v2 - shown.v2, motion.u2 - shown.u2
+    slip_v, slip_u = _SLIP * shown.v2, _SLIP * shown.u2
+    by_v = motion.sd_v2 * motion.sd_v2 + shown.sd_v2 * shown.sd_v2 + slip_v * slip_v
+    by_u = motion.sd_u2 * motion.sd_u2 + shown.sd_u2 * shown.sd_u2 + slip_u * slip_u
+    return v * v * by_u + u * u * by_v > _RULED_OUT * by_v * by_u
 
 
 @kernel

@@ -88,7 +88,8 @@ def reconsidered(
     A correction begins where the odometry, as given, is off by more than 20 ms or 2 % and by four standard
     deviations, and follows every later finding until that is within half of this; what is no longer known
     stays. What the motion may come later still is then what delay and lag together are uncertain by, three
-    standard deviations, and what of them is not corrected.
+    standard deviations, and what of them is not corrected. Where the two are not told apart, a motion that is
+    given to come up to a time later keeps that.
     """
     if now_ns < comparison.next_ns:
         return comparison
@@ -107,25 +108,28 @@ def reconsidered(
 
 def _corrected(found: Alignment, before: Correction, given: InputTrust) -> Correction:
     """What is applied after a finding."""
+    scaled = before._replace(
+        scale_v=_applied(found.scale_v, before.scale_v, 1.0, LEAST_SCALE),
+        scale_u=_applied(found.scale_u, before.scale_u, 1.0, LEAST_SCALE),
+    )
+    if found.delay is None or found.late is None:
+        return scaled
     lag = time_constant_of(given, before)
-    delay, applied = before.delay, lag
-    if found.lag is not None and found.delay is not None:
+    applied, none_sure = lag, 0.0
+    if found.lag is not None:
         applied = _applied(found.lag, lag, given.time_constant, LEAST_LAG)
-        # A delay that was told apart from another lag is none beside this one.
-        late = Known(found.delay.value + found.lag.value - applied, found.delay.sd)
-        delay = _applied(late, delay, 0.0, _LEAST_DELAY)
-    elif found.delay is not None:
-        late = Known(found.delay.value - lag, found.delay.sd)
-        delay = _applied(late, delay, 0.0, _LEAST_DELAY)
-    left = before.left
-    if found.late is not None:
-        left = SDS_LEFT * found.late.sd + abs(found.late.value - delay - applied)
-    return Correction(
-        delay,
-        _applied(found.scale_v, before.scale_v, 1.0, LEAST_SCALE),
-        _applied(found.scale_u, before.scale_u, 1.0, LEAST_SCALE),
-        before.time_constant if applied == lag else applied,
-        left,
+        none_sure = found.lag.sd if found.lag.value == 0.0 else 0.0
+    # A delay that was told apart from another lag is none beside this one.
+    late = Known(found.late.value - applied, found.delay.sd)
+    told_apart = applied != given.time_constant or none_sure > 0.0 or before.left >= 0.0
+    if not told_apart and 0.0 <= late.value < given.lag:
+        # A motion that comes up to so much later, nobody knows how, is better told so than by a delay.
+        return scaled
+    delay = _applied(late, before.delay, 0.0, _LEAST_DELAY)
+    return scaled._replace(
+        delay=delay,
+        time_constant=before.time_constant if applied == lag else applied,
+        left=SDS_LEFT * (found.late.sd + none_sure) + abs(late.value - delay),
     )
 
 

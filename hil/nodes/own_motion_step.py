@@ -6,7 +6,14 @@ from estimation.consistency.slip_estimate import with_slip
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import Measurement, PairSeen
 from estimation.own_motion.interval_motion import motion_between
-from estimation.own_motion.judged_odometry import age_of, aged, fresh_for, is_better, with_own_track
+from estimation.own_motion.judged_odometry import (
+    age_of,
+    aged,
+    contradicts,
+    fresh_for,
+    is_better,
+    with_own_track,
+)
 from estimation.own_motion.odometry_check import (
     POSE,
     TRACK,
@@ -145,27 +152,37 @@ def is_fresh(known: Known, rules: Rules, capture_ns: int) -> bool:
 
 
 @kernel
+def _either(motion: FollowerMotion, fresh: bool, own: OwnPoint, rules: Rules) -> FollowerMotion:
+    """Motion by odometry while that is fresh and no pose speaks against it, else by what is known better."""
+    shown = motion_of(own)
+    if fresh:
+        return shown if contradicts(motion, own) else motion
+    return shown if is_better(shown, motion, rules.own_noise) else motion
+
+
+@kernel
 def by_either(known: Known, memory: Memory, rules: Rules, due: OwnPoint) -> FollowerMotion:
-    """Motion at a pose that is due: by odometry while that is fresh, else by what is known better."""
+    """Motion at a pose that is due: by odometry, or by the follower's own track."""
     motion = _fresh_odometry(known, memory, rules, due.capture_ns)
-    if is_fresh(known, rules, due.capture_ns):
+    fresh = is_fresh(known, rules, due.capture_ns)
+    ring = known.own
+    # What the newest point has nothing against need not cost a step of the track's filter.
+    if fresh and (ring.length == 0 or not contradicts(motion, own_point(memory.own, ring, ring.length - 1))):
         return motion
-    own = motion_of(own_predicted(memory.own, known.own, due, rules.own_noise))
-    return own if is_better(own, motion, rules.own_noise) else motion
+    return _either(motion, fresh, own_predicted(memory.own, ring, due, rules.own_noise), rules)
 
 
 @kernel
 def by_either_at(known: Known, memory: Memory, rules: Rules, capture_ns: int) -> FollowerMotion:
     """The same at a point of the follower's own track, which may not have it."""
     motion = _fresh_odometry(known, memory, rules, capture_ns)
-    if is_fresh(known, rules, capture_ns):
-        return motion
     at = own_place(memory.own, known.own, capture_ns)
     if at == known.own.length:
         return motion
     point = own_point(memory.own, known.own, at)
-    own = motion_of(point)
-    return own if point.capture_ns == capture_ns and is_better(own, motion, rules.own_noise) else motion
+    if point.capture_ns != capture_ns:
+        return motion
+    return _either(motion, is_fresh(known, rules, capture_ns), point, rules)
 
 
 @kernel

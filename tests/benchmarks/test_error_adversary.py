@@ -1,11 +1,14 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from benchmarks.error_adversary import TURTLEBOT3, Robots, drive_out
+from benchmarks.error_adversary import TURTLEBOT3, WHOLE, Robots, drive_out
 from formation.error_set import error_set
 from formation.invariant_set import InvariantSet
+from formation.joint_set import Aside, joint_set
 
 MODEL = TURTLEBOT3._replace(W=0.015)
 
@@ -22,6 +25,19 @@ def test_nothing_gets_out_of_the_proved_set_and_something_comes_near_its_edge(in
     came = drive_out(MODEL, inside, np.random.default_rng(1), pairs=300, duration=20.0)
     assert (came.left, came.lost) == (0, 0)
     assert came.reached > 0.95
+
+
+@pytest.mark.slow
+def test_nothing_gets_out_of_the_joint_set_from_anywhere_in_alpha2s_ball() -> None:
+    found = joint_set(MODEL, Aside(2.0))
+    assert found is not None
+    came = drive_out(MODEL, found, np.random.default_rng(2), 300, 20.0, WHOLE)
+    assert (came.left, came.lost) == (0, 0)
+    assert came.reached > 0.7
+    stiffer_than_driven = drive_out(
+        MODEL, found, np.random.default_rng(2), 300, 20.0, replace(WHOLE, mu2=0.5)
+    )
+    assert stiffer_than_driven.left > 5
 
 
 def test_errors_beyond_those_assumed_drive_pairs_out(inside: InvariantSet) -> None:

@@ -6,6 +6,8 @@ import math
 
 import pytest
 
+from estimation.models.coordinated_turn import FollowerMotion
+from estimation.own_motion.judged_odometry import contradicts
 from estimation.own_motion.odometry_check import (
     POSE,
     TRACK,
@@ -18,6 +20,7 @@ from estimation.own_motion.odometry_check import (
     way_between,
     with_sample,
 )
+from estimation.own_motion.own_track import OwnPoint, own_begun, own_point
 from formation.pose import Motion, Pose, advance
 from formation.records import plain_rows_of
 from tests.estimation.own_motion.judged_robot import EPOCH_NS, MS, NOISE, JudgedRobot, Lie, honest
@@ -137,3 +140,36 @@ def test_noise_that_nobody_told_refutes_no_odometry(factor: float) -> None:
     robot = JudgedRobot(noise=factor)
     assert all(check.by_twist.trusted for check in robot.run(20.0))
     assert robot.check.heading_noise == pytest.approx(factor * factor, rel=0.6)
+
+
+def told(v: float, u: float) -> FollowerMotion:
+    return FollowerMotion(v, u, 5e-3, 3e-2)
+
+
+def tracked(v: float, u: float, rejected: int = 0) -> OwnPoint:
+    """Point of a track that knows its motion to 0.03 m/s and 0.3 rad/s, as one at 120 Hz does."""
+    pose, nothing = Pose(0.0, 0.0, 0.0), FollowerMotion(0.0, 0.0, 0.0, 0.0)
+    point = own_begun(EPOCH_NS, pose, False, nothing, NOISE)
+    spread = point.spread._replace(v_v=0.03**2, u_u=0.3**2)
+    return point._replace(state=point.state._replace(v=v, u=u), spread=spread, rejected=rejected)
+
+
+def test_what_poses_rule_out_is_known_before_it_is_refuted() -> None:
+    assert contradicts(told(-0.1, -0.5), tracked(0.1, 0.5))
+    assert contradicts(told(0.1, -1.0), tracked(0.1, 1.0))
+    for v, u in ((0.1, 0.5), (0.11, 0.55), (0.05, 0.2), (0.15, 1.0)):
+        assert not contradicts(told(v, u), tracked(0.1, 0.5))
+    # A track whose poses are outliers has no say.
+    assert not contradicts(told(-0.1, -0.5), tracked(0.1, 0.5, rejected=1))
+
+
+def test_healthy_odometry_is_ruled_out_at_no_pose() -> None:
+    robot, ruled_out, counted = JudgedRobot(), 0, 0
+    for _ in robot.run(20.0):
+        if robot.ring.length:
+            point = own_point(robot.own, robot.ring, robot.ring.length - 1)
+            motion = robot.drive((point.capture_ns - EPOCH_NS) * 1e-9)
+            ruled_out += contradicts(told(motion.v, motion.u), point)
+            counted += 1
+    assert counted > 500
+    assert ruled_out == 0

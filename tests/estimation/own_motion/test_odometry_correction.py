@@ -16,7 +16,14 @@ from estimation.own_motion.odometry_correction import (
     with_pose,
     with_sample,
 )
-from estimation.own_motion.odometry_history import AS_TOLD, IDEAL, Correction, InputTrust, MotionSample
+from estimation.own_motion.odometry_history import (
+    AS_TOLD,
+    IDEAL,
+    Correction,
+    InputTrust,
+    MotionSample,
+    left_of,
+)
 from formation.pose import Pose
 
 MS = 1_000_000
@@ -81,8 +88,10 @@ def corrected(
     before: Correction = IDEAL,
 ) -> Correction:
     """What is applied after this was found."""
-    monkeypatch.setattr(odometry_correction, "align_odometry", Aligned(Alignment(delay, scale_v, scale_u)))
-    return reconsidered(seen(before), ZERO_NS).applied
+    monkeypatch.setattr(
+        odometry_correction, "align_odometry", Aligned(Alignment(delay, scale_v, scale_u, None, delay))
+    )
+    return reconsidered(seen(before), ZERO_NS).applied._replace(left=AS_TOLD)
 
 
 def test_alignment_gets_all_in_seconds_from_the_first_pose(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,7 +108,7 @@ def test_alignment_gets_all_in_seconds_from_the_first_pose(monkeypatch: pytest.M
 def test_it_is_asked_once_a_second_and_not_before_there_are_two_of_each(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    align = Aligned(Alignment(Known(0.1, 0.001), None, None))
+    align = Aligned(Alignment(Known(0.1, 0.001), None, None, None, Known(0.1, 0.001)))
     monkeypatch.setattr(odometry_correction, "align_odometry", align)
     whole = seen()
     for short in (
@@ -177,13 +186,32 @@ def test_a_lag_is_applied_where_it_is_sure_and_else_its_time_is_one_of_delay(
     assert unsure.delay == pytest.approx(0.23)
     assert unsure.time_constant == AS_TOLD
     # What was told of the lag is what a delay comes on top of.
-    told = InputTrust(0.01, 0.1, time_constant=0.15, lag=0.3)
+    told = InputTrust(0.01, 0.1, time_constant=0.15)
     kept = answering(monkeypatch, Known(0.23, 0.01), None, told)
     assert kept.delay == pytest.approx(0.08)
     assert kept.time_constant == AS_TOLD
     same = answering(monkeypatch, Known(0.08, 0.01), Known(0.16, 0.02), told)
     assert same.delay == pytest.approx(0.09)
     assert same.time_constant == AS_TOLD
+
+
+def test_of_a_motion_that_is_told_to_come_later_nobody_knows_how_a_delay_is_not_made(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told = InputTrust(0.01, 0.1, lag=0.3)
+    for unsure in (None, Known(0.15, 0.04)):
+        late = 0.08 if unsure else 0.23
+        assert answering(monkeypatch, Known(late, 0.01), unsure, told) == IDEAL
+    # A delay alone, or one beyond what is told, is one.
+    alone = answering(monkeypatch, Known(0.2, 0.01), Known(0.0, 0.02), told)
+    assert alone.time_constant == AS_TOLD
+    assert left_of(told, alone) == pytest.approx(0.09)
+    assert alone.delay == pytest.approx(0.2)
+    beyond = answering(monkeypatch, Known(0.4, 0.01), None, told)
+    assert beyond.delay == pytest.approx(0.4)
+    # Once told apart, that is what later findings are seen by.
+    apart = answering(monkeypatch, Known(0.08, 0.01), Known(0.15, 0.02), told)
+    assert answering(monkeypatch, Known(0.24, 0.01), None, told, apart).delay == pytest.approx(0.09)
 
 
 def test_what_is_told_of_odometry_is_taken_off_before_it_is_compared(monkeypatch: pytest.MonkeyPatch) -> None:
