@@ -21,12 +21,12 @@ from estimation.filters.filter import EKF, Filter
 from estimation.filters.gaussian import Gaussian, nis_of
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import NO_MOTION
-from estimation.tracking.track_point import RESTARTED, USED, TrackPoint
+from estimation.tracking.track_point import GATED, USED, TrackPoint
 from formation.kernel import kernel
 from formation.records import Rows, load, store
 
-SLIP_MEMBERS, SLIP_RATIO, SLIP_LOWEST = 5, 10.0 ** (1.0 / 3.0), 0.1
-"""Filters, ratio between their deviations, and the lowest over what is told: from a tenth to twice that."""
+SLIP_MEMBERS, SLIP_RATIO, SLIP_LOWEST = 6, 10.0 ** (1.0 / 3.0), 0.1
+"""Filters, ratio between their deviations, and the lowest over what is told: a tenth to five times that."""
 
 BANK = LANES + SLIP_MEMBERS
 """Rows of a bank with room for these behind those for the process noise."""
@@ -46,7 +46,8 @@ class LearnedSlip(NamedTuple):
 
     scale: deviations of the follower's motion over those told. begun: whether the members run. at_ns: time
     of their beliefs. seen_ns: capture of the newest point looked at. way_s, way: time [s] since ``at_ns``
-    over which the way is known, and the sums of its motion over that, its variances times time.
+    over which the way is known, and the sums of its motion over that, its variances times time. gated:
+    whether that newest point was not believed.
     """
 
     scale: float
@@ -55,9 +56,10 @@ class LearnedSlip(NamedTuple):
     seen_ns: int
     way_s: float
     way: FollowerMotion
+    gated: bool
 
 
-SLIP_AS_TOLD = LearnedSlip(1.0, False, 0, 0, 0.0, NO_MOTION)
+SLIP_AS_TOLD = LearnedSlip(1.0, False, 0, 0, 0.0, NO_MOTION, gated=False)
 
 
 @kernel
@@ -73,7 +75,10 @@ def learn_slip(learned: LearnedSlip, bank: Rows[Member], point: TrackPoint, esti
     if now_ns <= learned.seen_ns:
         return learned
     learned = learned._replace(seen_ns=now_ns)
-    if not point.settled or not point.measurement.has_way or point.verdict == RESTARTED:
+    # One that alone was not believed is an outlier; one after the other, and the way there may be to blame.
+    outlier = point.verdict == GATED and not learned.gated
+    learned = learned._replace(gated=point.verdict == GATED)
+    if not point.measurement.has_way or not (point.settled or learned.begun):
         return learned._replace(begun=False)
     if not learned.begun:
         if point.verdict != USED:
@@ -91,7 +96,7 @@ def learn_slip(learned: LearnedSlip, bank: Rows[Member], point: TrackPoint, esti
         was.sd_u2 + way.sd_u2 * way.sd_u2 * dt,
     )
     learned = learned._replace(way_s=learned.way_s + dt, way=added)
-    if now_ns - learned.at_ns < _INTERVAL_NS or point.verdict != USED:
+    if now_ns - learned.at_ns < _INTERVAL_NS or outlier:
         return learned
     if abs(learned.way_s - (now_ns - learned.at_ns) * _NS) > _SAME:
         # Something came late in between, so that part of the way is missing.
