@@ -79,11 +79,12 @@ class _Pairs:
         self.rho = random.uniform(inside.rho_min, inside.rho_max, n)
         self.theta = random.uniform(*inside.span(self.rho)) - ABREAST_ALPHA1
         self.epsilon, self.v2, self.u2 = np.zeros(n), np.full(n, math.nan), np.zeros(n)
+        self._across = np.zeros(n, dtype=np.bool_)
         if isinstance(inside, JointSet):
             share = np.clip(random.uniform(-1.5, 1.5, n), -1.0, 1.0)
             self.epsilon = share * inside.radius(self.rho)
-        # Some do nothing but move alpha2, while their leaders do what hurts.
-        self._across = (random.random(n) < 0.25) & isinstance(inside, JointSet)
+            # Some do nothing but move alpha2, while their leaders do what hurts.
+            self._across = random.random(n) < 0.25
         self._cunning = random.random(n) < 0.7
         self._margin = random.uniform(0.0, 0.2, n) * (random.random(n) < 0.8)
         self._rate = 1.0 / np.exp(random.uniform(math.log(0.05), math.log(10.0), n))

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -33,11 +31,9 @@ def test_nothing_gets_out_of_the_joint_set_from_anywhere_in_alpha2s_ball() -> No
     assert found is not None
     came = drive_out(MODEL, found, np.random.default_rng(2), 300, 20.0, WHOLE)
     assert (came.left, came.lost) == (0, 0)
-    assert came.reached > 0.7
-    stiffer_than_driven = drive_out(
-        MODEL, found, np.random.default_rng(2), 300, 20.0, replace(WHOLE, mu2=0.5)
-    )
-    assert stiffer_than_driven.left > 5
+    assert came.reached > 0.5
+    worse = drive_out(MODEL._replace(W=0.03), found, np.random.default_rng(2), 300, 10.0, WHOLE)
+    assert worse.left > 5, "it does not hold for twice the error"
 
 
 def test_errors_beyond_those_assumed_drive_pairs_out(inside: InvariantSet) -> None:
