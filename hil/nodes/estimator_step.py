@@ -16,7 +16,7 @@ from estimation.consistency.process_estimate import (
     learned_noise,
     restarted,
 )
-from estimation.consistency.slip_estimate import LearnedSlip, learn_slip
+from estimation.consistency.slip_estimate import SLIP_LOWEST, LearnedSlip, learn_slip
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import (
     Measurement,
@@ -197,7 +197,9 @@ def take(knowns: Rows[Known], memory: Memory, rules: Rules, measurement: Measure
         # Of the newest odometry may still come; the one before it has been folded with all there is.
         settled = point_at(points, added.ring, added.ring.length - 2)
         slips = within(Known, knowns, 0, "slip")
-        store(slips, 0, learn_slip(load(LearnedSlip, slips, 0), memory.bank, settled, rules.filter))
+        # Commands that were obeyed for a while may not be next time: of these only what is worse is learned.
+        least = 1.0 if rules.trust.lag > 0.0 else SLIP_LOWEST
+        store(slips, 0, learn_slip(load(LearnedSlip, slips, 0), memory.bank, settled, least, rules.filter))
     if rules.filter.in_world and not late:
         point, settings = newest(points, added.ring), rules.settings
         travels = within(Known, knowns, 0, "travel")
@@ -228,6 +230,9 @@ def _learn(knowns: Rows[Known], memory: Memory, rules: Rules, verdict: int) -> N
     if point.period > SELDOM:
         return
     if point.measurement.has_way and rules.trust.lag > 0.0:
+        if point.measurement.framed:
+            # Dozens of frames within one error of the wheels would pass for as many proofs.
+            return
         # Where commands stand in for motion, what is seen across the line of sight tells how the follower
         # obeys, not how the leader drives.
         point = point._replace(measurement=seen_in_range(point.measurement))
