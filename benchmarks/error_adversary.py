@@ -1,11 +1,12 @@
-"""A search for leaders and wrong beliefs that drive a pair out of its proved set with errors.
+"""A search for leaders and wrong beliefs that drive a pair out of its proved sets with errors.
 
     python benchmarks/error_adversary.py [--pairs 10000] [--robots 1000] [--duration 30] [--seed 1]
 
-First line: the model that the certificate is about, alpha2 at rest. Then robots: alpha2 moves under law (4)
-on the same wrong belief, motors lag, commands are truncated; without limits of speed, and within the robots'.
-How far these get out of the set is what the certificate leaves out; ``lost``: passed each other or drifted
-apart.
+First the set on the manifold alpha2 = pi/2, then the joint set of rho, alpha1 and alpha2, for an error one
+percent below the largest for which it closes: pairs begin anywhere in it, alpha2 off by up to its radius.
+The first line of each is the model that the proof is about. Then robots: motors lag, commands are truncated,
+alone and together, without limits of speed and within the robots'. How far these get out of the set is what
+the proofs leave out; ``lost``: passed each other or drifted apart.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from formation.angles import FloatArray
 from formation.error_set import error_set
 from formation.error_set_kernels import ErrorModel
 from formation.invariant_set import InvariantSet
+from formation.joint_set import Aside, JointSet, joint_set, largest_error
 from formation.shape import ABREAST_ALPHA1
 from formation.spacing import restoring
 
@@ -38,13 +40,19 @@ _LOST = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Robots:
-    """What the reduced model leaves out: mu2 [rad/s], lag [s], what commands are truncated to, limits."""
+    """What the reduced model leaves out: mu2 [rad/s], lag [s], what commands are truncated to, limits.
+
+    Without lag the system (3) itself, under laws (4) and (8).
+    """
 
     mu2: float = 2.0
     lag: float = 0.1
     resolution: float = 0.01
     v_max: float = math.inf
     u_max: float = math.inf
+
+
+Held = InvariantSet | JointSet
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,11 +74,17 @@ class Came:
 class _Pairs:
     """Many pairs with their leaders' choices: half by chance, half whatever hurts now, after a margin."""
 
-    def __init__(self, model: ErrorModel, inside: InvariantSet, random: np.random.Generator, n: int) -> None:
+    def __init__(self, model: ErrorModel, inside: Held, random: np.random.Generator, n: int) -> None:
         self.model, self._random = model, random
         self.rho = random.uniform(inside.rho_min, inside.rho_max, n)
         self.theta = random.uniform(*inside.span(self.rho)) - ABREAST_ALPHA1
         self.epsilon, self.v2, self.u2 = np.zeros(n), np.full(n, math.nan), np.zeros(n)
+        self._across = np.zeros(n, dtype=np.bool_)
+        if isinstance(inside, JointSet):
+            share = np.clip(random.uniform(-1.5, 1.5, n), -1.0, 1.0)
+            self.epsilon = share * inside.radius(self.rho)
+            # Some do nothing but move alpha2, while their leaders do what hurts.
+            self._across = random.random(n) < 0.25
         self._cunning = random.random(n) < 0.7
         self._margin = random.uniform(0.0, 0.2, n) * (random.random(n) < 0.8)
         self._rate = 1.0 / np.exp(random.uniform(math.log(0.05), math.log(10.0), n))
@@ -87,6 +101,8 @@ class _Pairs:
         by_chance = (random.random(n) < _HOLD * STEP * self._rate) & ~self._cunning
         drawn = random.uniform(0.0, 2.0 * math.pi, n)
         self.place = np.where(hurts, worst, np.where(by_chance, drawn, self.place))
+        aside = 0.5 * math.pi * np.where(self.place % (2.0 * math.pi) < math.pi, 1.0, -1.0)
+        self.place = np.where(self._across & ~hurts, aside, self.place)
         self.u1 = np.where(hurts, -side * k_u, np.where(by_chance, -self.u1, self.u1))
 
     def believed(self, place: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -115,6 +131,20 @@ class _Pairs:
             rates = -self.model.v1 * np.sin(self.theta), -self.u1 + across / self.rho + self._pull(self.place)
             self.rho, self.theta = rho + h * rates[0], theta + h * rates[1]
 
+    def drive_whole(self, robots: Robots) -> None:
+        """One step of the system (3) under laws (4) and (8), carried out at once; midpoint rule."""
+        rho, theta, epsilon = self.rho, self.theta, self.epsilon
+        for h in (0.5 * STEP, STEP):
+            v2 = np.clip(self.asked(self.place), -robots.v_max, robots.v_max)
+            sine, cosine = np.cos(self.epsilon), -np.sin(self.epsilon)
+            _, believed = self.believed(self.place)
+            x, y = self.model.v1 * np.sin(self.theta), -self.model.v1 * np.cos(self.theta)
+            turn = (y + v2 * sine) / self.rho
+            u2 = -robots.mu2 * cosine + (believed + v2 * sine) / self.rho
+            rates = -x - v2 * cosine, turn - self.u1, turn - np.clip(u2, -robots.u_max, robots.u_max)
+            self.rho = np.clip(rho + h * rates[0], 1e-2, 10.0)
+            self.theta, self.epsilon = theta + h * rates[1], epsilon + h * rates[2]
+
     def drive_robots(self, robots: Robots) -> None:
         """One step with motors that lag behind truncated commands."""
         sine, cosine = np.cos(self.epsilon), -np.sin(self.epsilon)
@@ -122,8 +152,9 @@ class _Pairs:
         _, y = self.believed(self.place)
         u2 = -robots.mu2 * cosine + (y + v2 * sine) / self.rho
         cut = robots.resolution
-        wanted = (np.trunc(v2 / cut) * cut, np.trunc(np.clip(u2, -robots.u_max, robots.u_max) / cut) * cut)
-        keeps = math.exp(-STEP / robots.lag)
+        u2 = np.clip(u2, -robots.u_max, robots.u_max)
+        wanted = (np.trunc(v2 / cut) * cut, np.trunc(u2 / cut) * cut) if cut > 0.0 else (v2, u2)
+        keeps = math.exp(-STEP / robots.lag) if robots.lag > 0.0 else 0.0
         first = np.isnan(self.v2)
         self.v2 = np.where(first, v2, wanted[0] + (self.v2 - wanted[0]) * keeps)
         self.u2 = np.where(first, u2, wanted[1] + (self.u2 - wanted[1]) * keeps)
@@ -136,7 +167,7 @@ class _Pairs:
 
 def drive_out(
     model: ErrorModel,
-    inside: InvariantSet,
+    inside: Held,
     random: np.random.Generator,
     pairs: int,
     duration: float,
@@ -153,6 +184,8 @@ def drive_out(
             tried.choose()
         if robots is None:
             tried.drive_model()
+        elif robots.lag == 0.0 and robots.resolution == 0.0:
+            tried.drive_whole(robots)
         else:
             tried.drive_robots(robots)
         rho, theta = tried.rho, tried.theta
@@ -187,25 +220,46 @@ def main() -> None:
     parser.add_argument("--W", type=float, default=TURTLEBOT3.W)
     given = parser.parse_args()
     model = TURTLEBOT3._replace(W=given.W)
-    found = error_set(model)
-    if found is None:
+    plane = error_set(model)
+    if plane is None:
         print(f"no set is proved for W = {given.W} m/s")
         return
-    inside = found.inside
+    _try_out("on the manifold", model, plane.inside, given, None)
+    robots = Robots()
+    smaller = model._replace(W=0.99 * largest_error(model, Aside(robots.mu2)))
+    joint = joint_set(smaller, Aside(robots.mu2))
+    if joint is None:
+        print("no joint set is proved")
+        return
+    _try_out(f"jointly, alpha2 within {joint.alpha2_within:.4f} rad,", smaller, joint, given, WHOLE)
+
+
+WHOLE = Robots(lag=0.0, resolution=0.0)
+
+
+def _try_out(
+    name: str, model: ErrorModel, inside: Held, given: argparse.Namespace, first: Robots | None
+) -> None:
     print(
-        f"proved for W = {model.W:g} m/s: rho {inside.rho_min:.5f} to {inside.rho_max:.5f} m, "
+        f"proved {name} for W = {model.W:g} m/s: rho {inside.rho_min:.5f} to {inside.rho_max:.5f} m, "
         f"alpha1 {inside.alpha1_min:.4f} to {inside.alpha1_max:.4f} rad"
     )
-    rows = (
-        ("the assumed model", given.pairs, None),
-        ("alpha2 moves", given.robots, Robots(lag=1e-3, resolution=1e-9)),
-        ("lag, truncation", given.robots, Robots()),
-        ("the same within limits", given.robots, Robots(v_max=0.22, u_max=2.84)),
-    )
-    for name, pairs, robots in rows:
+    rows = [
+        ("the assumed model", given.pairs, first),
+        ("alpha2 moves", given.robots, WHOLE),
+        ("truncation alone", given.robots, Robots(lag=0.0)),
+        ("lag of 0.02 s alone", given.robots, Robots(lag=0.02, resolution=0.0)),
+        ("lag of 0.1 s alone", given.robots, Robots(resolution=0.0)),
+        ("lag and truncation", given.robots, Robots()),
+        ("limits alone", given.robots, Robots(lag=0.0, resolution=0.0, v_max=0.22, u_max=2.84)),
+        ("all of it", given.robots, Robots(v_max=0.22, u_max=2.84)),
+    ]
+    for row, pairs, robots in rows:
+        if row == "alpha2 moves" and first is not None:
+            continue
         came = drive_out(model, inside, np.random.default_rng(given.seed), pairs, given.duration, robots)
         print(
-            f"{name:<24} {came.pairs} pairs: {came.left} left the set, {came.lost} lost, excess "
+            f"  {row:<24} {came.pairs} pairs: {came.left} left the set, {came.lost} lost, excess "
             f"{came.excess_rho:.4f} m, {came.excess_alpha1:.4f} rad, reached {came.reached:.1%} of the way",
             flush=True,
         )

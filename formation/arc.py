@@ -45,6 +45,11 @@ def small_turn(x: float) -> Turn:
     """sin(x)/x and cos(x): up to an eighth of a radian by series that are exact to rounding there."""
     if abs(x) > _SMALL:
         return Turn(math.sin(x) / x, math.cos(x))
+    return _turn_by_series(x)
+
+
+@kernel
+def _turn_by_series(x: float) -> Turn:
     q = x * x
     sinc = 1.0 - q * (1 / 6) * (1.0 - q * (1 / 20) * (1.0 - q * (1 / 42) * (1.0 - q * (1 / 72))))
     versed = q * 0.5 * (1.0 - q * (1 / 12) * (1.0 - q * (1 / 30) * (1.0 - q * (1 / 56))))
@@ -70,10 +75,25 @@ def along(at: Course, v: float, u: float, dt: float) -> Course:
 def swing(u: float, dt: float) -> Swing:
     """Turn by u dt and its integrals."""
     a = u * dt
+    if not abs(a) > _SMALL:
+        return small_swing(u, dt)
     whole, half = small_turn(a), small_turn(0.5 * a)
     s, c = dt * whole.sinc, 0.5 * dt * a * half.sinc * half.sinc
-    if abs(a) > _SMALL:
-        return Swing(whole.cos, a * whole.sinc, s, c, (dt * whole.cos - s) / u, (dt * a * whole.sinc - c) / u)
+    return Swing(whole.cos, a * whole.sinc, s, c, (dt * whole.cos - s) / u, (dt * a * whole.sinc - c) / u)
+
+
+@kernel
+def is_small_swing(u: float, dt: float) -> bool:
+    """Whether a turn is one that :func:`small_swing` is for."""
+    return abs(u * dt) <= _SMALL
+
+
+@kernel
+def small_swing(u: float, dt: float) -> Swing:
+    """The same of a turn by up to an eighth of a radian, by series alone: without a branch."""
+    a = u * dt
+    whole, half = _turn_by_series(a), _turn_by_series(0.5 * a)
+    s, c = dt * whole.sinc, 0.5 * dt * a * half.sinc * half.sinc
     q = a * a
     s_by_u = -dt * dt * a * (1 / 3) * (1.0 - q * (1 / 10) * (1.0 - q * (1 / 28) * (1.0 - q * (1 / 54))))
     c_by_u = dt * dt * (0.5 - q * (1 / 8) * (1.0 - q * (1 / 18) * (1.0 - q * (1 / 40))))

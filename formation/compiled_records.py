@@ -19,6 +19,7 @@ _SCALARS: dict[Any, Any] = {float: types.float64, int: types.int64, bool: types.
 BYTES = types.Bytes(types.uint8, 1, "C", readonly=True)
 """Type of ``bytes``."""
 
+_FLOAT_BYTES = 8
 _BYTE = ir.IntType(8)
 _WORD = ir.IntType(64)
 
@@ -71,21 +72,23 @@ def _walk(context: Any, builder: Any, kind: Any, place: _Place, value: Any) -> A
 class _Place(NamedTuple):
     """A row in memory, or a field of it: where the row begins, then the field's names, type and offset.
 
-    paths: from each record that holds it, the row's own first.
+    paths: from each record that holds it, the row's own first. apart: how many records lie field by field.
     """
 
     row: Any
     paths: tuple[str, ...]
     dtype: Any
     offset: int
+    apart: int = 1
 
     def field(self, owner: type, name: str) -> _Place:
         dtype, offset = self.dtype.fields[name][:2]
         paths = (*self.paths, f"{owner.__module__}.{owner.__qualname__}")
-        return _Place(self.row, tuple(f"{path}.{name}" for path in paths), dtype, self.offset + offset)
+        paths = tuple(f"{path}.{name}" for path in paths)
+        return _Place(self.row, paths, dtype, self.offset + offset, self.apart)
 
     def pointer(self, builder: Any, held: Any) -> Any:
-        at = builder.gep(self.row, [ir.Constant(_WORD, self.offset)], inbounds=True)
+        at = builder.gep(self.row, [ir.Constant(_WORD, self.offset * self.apart)], inbounds=True)
         return builder.bitcast(at, held.as_pointer())
 
     def tag(self, module: Any) -> Any:
@@ -99,15 +102,18 @@ class _Place(NamedTuple):
         return module.add_metadata([scalar, scalar, ir.Constant(_WORD, 0)])
 
 
-def _row(context: Any, builder: Any, record: Any, rows_type: Any, rows: Any, index: Any) -> _Place:
+def _row(
+    context: Any, builder: Any, record: Any, rows_type: Any, rows: Any, index: Any, apart: int = 1
+) -> _Place:
     dtype = records.dtype_of(record.instance_class)
+    span = dtype.itemsize if apart == 1 else _FLOAT_BYTES
     if isinstance(rows_type, types.Array):
         array = context.make_array(rows_type)(context, builder, rows)
         base = builder.bitcast(array.data, _BYTE.as_pointer())
     else:
         base = builder.inttoptr(builder.extract_value(rows, 0), _BYTE.as_pointer())
-    row = builder.gep(base, [builder.mul(index, ir.Constant(_WORD, dtype.itemsize))], inbounds=True)
-    return _Place(row, (), dtype, 0)
+    row = builder.gep(base, [builder.mul(index, ir.Constant(_WORD, span))], inbounds=True)
+    return _Place(row, (), dtype, 0, apart)
 
 
 def _teach(function: Any, typer: Any, code: Any) -> None:
@@ -148,6 +154,29 @@ def _teach_rows() -> None:
         begin = builder.add(builder.extract_value(arguments[1], 0), builder.mul(arguments[2], size))
         return context.make_tuple(builder, span, [begin, arguments[3]])
 
+    def typed_load_across(kind: Any, rows: Any, count: Any, k: Any) -> Any:
+        if not isinstance(count, types.IntegerLiteral):
+            return None
+        return typing_signature(record_type(kind.instance_class), kind, rows, count, types.int64)
+
+    def load_across(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        record, (_, rows, count, _) = signature.return_type, signature.args
+        at, k = arguments[1], arguments[3]
+        place = _row(context, builder, record, rows, at, k, count.literal_value)
+        return _walk(context, builder, record, place, None)
+
+    def typed_store_across(rows: Any, count: Any, k: Any, record: Any) -> Any:
+        if not isinstance(count, types.IntegerLiteral):
+            return None
+        return typing_signature(types.none, rows, count, types.int64, record_type(record.instance_class))
+
+    def store_across(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        rows, count, _, record = signature.args
+        at, k = arguments[0], arguments[2]
+        place = _row(context, builder, record, rows, at, k, count.literal_value)
+        _walk(context, builder, record, place, arguments[3])
+        return context.get_dummy_value()
+
     def typed_within(kind: Any, rows: Any, k: Any, name: Any) -> Any:
         if not isinstance(name, types.StringLiteral):
             return None
@@ -174,6 +203,8 @@ def _teach_rows() -> None:
         lambda kind, rows, first, count: typing_signature(span, kind, rows, types.int64, types.int64),
         part,
     )
+    _teach(records.load_across, typed_load_across, load_across)
+    _teach(records.store_across, typed_store_across, store_across)
     _teach(records.within, typed_within, within)
     _teach(records.size, lambda rows: typing_signature(types.int64, rows), size)
 

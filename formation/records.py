@@ -181,6 +181,37 @@ def within(kind: type[R], rows: Rows[R], k: int, name: str) -> Rows[Any]:
     return cast("Rows[Any]", columns_of(rows)[k : k + 1][name])
 
 
+def load_across(kind: type[R], rows: Rows[R], count: int, k: int) -> R:
+    """The k-th of ``count`` records, a constant, that fill as many rows, the first ones, field by field.
+
+    Each field of all of them lies side by side, so that compiled code works on several at once. All fields
+    are floats. These rows are not for :func:`load` and :func:`store`.
+
+    >>> class Point(NamedTuple):
+    ...     x: float
+    ...     y: float
+    >>> points = rows_of(Point, 2)
+    >>> store_across(points, 2, 1, Point(1.0, 2.0))
+    >>> load_across(Point, points, 2, 1), load(Point, points, 1)
+    (Point(x=1.0, y=2.0), Point(x=0.0, y=2.0))
+    """
+    held = np.ascontiguousarray(_fields_of_all(rows, count)[:, k])
+    made: R = _maker(cast("Any", kind))(held.view(columns_of(rows).dtype)[0].item())
+    return made
+
+
+def store_across(rows: Rows[R], count: int, k: int, record: R) -> None:
+    """Put a record in the place of the k-th of ``count`` that fill the rows field by field."""
+    row = np.zeros(1, columns_of(rows).dtype)
+    row[0] = record
+    _fields_of_all(rows, count)[:, k] = row.view(np.float64)
+
+
+def _fields_of_all(rows: Rows[Any], count: int) -> NDArray[np.float64]:
+    """Fields (n, count) of records that lie field by field in the first rows."""
+    return columns_of(rows)[:count].view(np.float64).reshape(-1, count)
+
+
 class _ListPart:
     """Part of a list that stands for rows."""
 

@@ -10,7 +10,7 @@ errors of h.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -18,39 +18,23 @@ import numpy as np
 
 from estimation.bounds.assumptions import Assumptions
 from estimation.bounds.error_bounds import Perceived, RateErrors, paper_h, sound_h
+from estimation.bounds.formation_claims import (
+    Claim,
+    extremes,
+    formation_in,
+    formation_with_alpha2,
+    k_u_star,
+)
 from estimation.bounds.guarantees import alpha2_ultimate, guaranteed_rate
 from formation.angles import FloatArray
 from formation.error_set import error_set
 from formation.error_set_kernels import ErrorModel
 from formation.invariant_set import Disturbed, InvariantSet, invariant_set
 from formation.speed_range import SpeedRange
-from formation.station import Side
-from formation.steering_margin import steering_margin
 
 _GRID = 33
 _ROUNDS = 50
 _SETTLED = 1e-6
-
-MANIFOLD = "the reduced system (5), that is alpha2 at rest, under law (8), without limits or lag"
-START = "a start inside the set"
-NOT_SAFETY = (
-    "boundedness, not safety: rho lies between the middles of two robots, which touch where it comes down to "
-    "their width (a TurtleBot3 Burger is 0.178 m wide)"
-)
-
-
-@dataclass(frozen=True, slots=True)
-class Claim:
-    """Guaranteed figures by name (none if nothing is guaranteed), what they rest on, and why some miss."""
-
-    figures: dict[str, float] = field(default_factory=dict)
-    assumes: tuple[str, ...] = ()
-    why: str | None = None
-
-    def as_dict(self) -> dict[str, Any]:
-        """The figures, ``assumes``, and ``why`` where there is one, as plain values."""
-        entry: dict[str, Any] = {**self.figures, "assumes": list(self.assumes)}
-        return entry if self.why is None else entry | {"why": self.why}
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +57,7 @@ class Certificate:
     formation: Claim
     formation_any_speed: Claim
     formation_with_errors: Claim
+    formation_with_alpha2: Claim
     k_u_star: Claim
 
     def claims(self) -> dict[str, Claim]:
@@ -97,16 +82,17 @@ def certify(given: Assumptions) -> Certificate:
         estimates=_estimates(given, velocity_error),
         h=_h(given, velocity_error, held),
         alpha2_ultimate=_alpha2_ultimate(given, rates.figures["M_alpha2"]),
-        formation=_formation(given, system, held, "exact estimates"),
+        formation=formation_in(given, system, held, "exact estimates"),
         formation_any_speed=_formation_any_speed(given, system),
         formation_with_errors=_formation_with_errors(given, velocity_error, system, held),
-        k_u_star=_k_u_star(given),
+        formation_with_alpha2=formation_with_alpha2(given, velocity_error, system),
+        k_u_star=k_u_star(given),
     )
 
 
 def formation_claim(given: Assumptions) -> Claim:
     """The claim ``formation`` of :func:`certify` alone: for those who go through many."""
-    return _formation(given, *_held(given), "exact estimates")
+    return formation_in(given, *_held(given), "exact estimates")
 
 
 def rates_claim(given: Assumptions) -> Claim:
@@ -220,41 +206,10 @@ def _alpha2_ultimate(given: Assumptions, M_alpha2: float) -> Claim:
     return Claim({"value": float(alpha2_ultimate(M_alpha2, given.mu2))}, assumes)
 
 
-def _formation(given: Assumptions, system: Disturbed, held: InvariantSet | None, besides: str) -> Claim:
-    speeds = system.speeds
-    drives = (
-        f"v1 = {speeds.lowest:g} m/s, constant"
-        if speeds.lowest == speeds.highest
-        else f"v1 anywhere between {speeds.lowest:g} and {speeds.highest:g} m/s"
-    )
-    assumes = (f"|u1| <= k_u = {given.k_u:g} rad/s", drives, besides, MANIFOLD, START, NOT_SAFETY)
-    if held is None:
-        return Claim({}, assumes, given.unproved or _why_not_held(given, system))
-    return Claim(_extremes(given, held), assumes)
-
-
-def _extremes(given: Assumptions, held: InvariantSet) -> dict[str, float]:
-    # The left is the right's mirror image, which changes the sign of every bearing.
-    low, high = (held.alpha1_min, held.alpha1_max)
-    if given.side is Side.LEFT:
-        low, high = -high, -low
-    return {"rho_min": held.rho_min, "rho_max": held.rho_max, "alpha1_min": low, "alpha1_max": high}
-
-
-def _why_not_held(given: Assumptions, system: Disturbed) -> str:
-    reach = given.spacing.mu_rho * system.speeds.lowest
-    if reach <= system.D:
-        return (
-            f"a constant turn of {system.D:.3g} rad/s is not below mu_rho v1 = {reach:.3g} rad/s: "
-            "no distance balances it"
-        )
-    return f"the worst steering within {system.D:.3g} rad/s carries alpha1 past its saddle"
-
-
 def _formation_any_speed(given: Assumptions, system: Disturbed) -> Claim:
     any_speed = replace(system, speeds=SpeedRange(given.v_eps, given.k_v))
     held = None if given.unproved else invariant_set(any_speed)
-    return _formation(given, any_speed, held, "exact estimates")
+    return formation_in(given, any_speed, held, "exact estimates")
 
 
 def _formation_with_errors(
@@ -277,14 +232,14 @@ def _formation_with_errors(
             f"the worst steering within {given.k_u:g} rad/s with the worst belief within "
             f"{velocity_error:.3g} m/s carries alpha1 past its saddle, or the robots apart"
         )
-        return Claim({}, _formation(given, system, None, besides).assumes, why)
+        return Claim({}, formation_in(given, system, None, besides).assumes, why)
     assumes = (
-        *_formation(given, system, found.inside, besides).assumes,
+        *formation_in(given, system, found.inside, besides).assumes,
         "proved piece by piece along the whole boundary, which every motion crosses inwards at "
         f"{found.inward:.1e} rho_0 or rad a second at the least",
         _moved_aside(given, velocity_error / found.inside.rho_min),
     )
-    return Claim(_extremes(given, found.inside) | {"W": velocity_error}, assumes)
+    return Claim(extremes(given, found.inside) | {"W": velocity_error}, assumes)
 
 
 def _moved_aside(given: Assumptions, M_alpha2: float) -> str:
@@ -308,34 +263,12 @@ def _formation_by_h(
     disturbed = system
     for _ in range(_ROUNDS):
         if held is None:
-            return _formation(given, disturbed, None, besides)
+            return formation_in(given, disturbed, None, besides)
         error = float(_h_bounds(given, velocity_error, *_states(given, velocity_error, held))[1].max())
         enlarged = given.k_u + error
         if abs(enlarged - disturbed.D) <= _SETTLED:
-            claim = _formation(given, disturbed, held, f"{besides}, {error:.3g} rad/s")
+            claim = formation_in(given, disturbed, held, f"{besides}, {error:.3g} rad/s")
             return replace(claim, figures=claim.figures | {"W": velocity_error})
         disturbed = replace(disturbed, D=enlarged + 0.5 * _SETTLED)
         held = invariant_set(disturbed)
     return Claim({}, (besides,), "the set and the error of h within it keep enlarging each other")
-
-
-def _k_u_star(given: Assumptions) -> Claim:
-    speeds = given.speeds
-    assumes = ("exact estimates", MANIFOLD, f"v1 = {speeds.lowest:g} m/s, constant")
-    if given.unproved:
-        return Claim({}, assumes, given.unproved)
-    if speeds.lowest != speeds.highest:
-        why = (
-            "Prop. 3 is about a leader of constant speed; "
-            f"this one drives {speeds.lowest:g} to {speeds.highest:g} m/s"
-        )
-        return Claim({}, (*assumes[:2], "a constant v1"), why)
-    margin = steering_margin(given.mu1, given.spacing, speeds.lowest)
-    below = "lower: below it one stable orbit in a set that keeps all its motions"
-    lower = (
-        f"{below} is proved: contraction in a metric, in interval arithmetic over the whole set"
-        if margin.proved
-        else f"{below} is computed, not proved: contraction in a constant metric"
-    )
-    upper = "upper: above it a periodic steering is known that throws the pair off"
-    return Claim({"lower": margin.lower, "upper": margin.upper}, (*assumes, lower, upper))

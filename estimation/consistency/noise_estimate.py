@@ -34,6 +34,7 @@ _NS = 1e-9
 STRIDE_NS = 47_000_000  # no multiple of a usual spacing of frames, so that a microsecond doesn't matter
 LONGEST_NS = 520_000_000  # four positions further apart tell more of the motion than of the noise
 _ANOTHER = 1.2  # factor between two scales from which on they don't agree
+_FOLLOWED = 3.0  # [s] in which what rests on a scale follows one that becomes known more exactly
 _LEAST_LEFT = 0.05  # of an innovation after the update; what leaves less tells nothing of the noise
 _HALF_TRACK = 0.1  # by which a turn rate is the speed of a wheel [m]
 
@@ -155,11 +156,12 @@ def noise_with_frame(
     """
     if gated and not estimate.gated:
         return estimate._replace(gated=True)
-    estimate = estimate._replace(gated=gated)
+    estimate, followed = estimate._replace(gated=gated), 0.0
     if estimate.frames.held > 0:
         since_ns = moment.capture_ns - estimate.frames.a.capture_ns
         if since_ns <= 0:
             return estimate
+        followed = min(1.0, since_ns * _NS / _FOLLOWED)
         if since_ns > LONGEST_NS:
             estimate = kept_noise(estimate)._replace(gated=gated)
     by_frame = _differenced(estimate.by_frame, estimate.frames, estimate.strides, moment, learning)
@@ -171,9 +173,16 @@ def noise_with_frame(
         position=certain_scale(by_frame.position, by_stride.position),
         heading=certain_scale(by_frame.heading, by_stride.heading),
     )
-    frames = _pushed(estimate.frames, moment)
-    return estimate._replace(
-        scale=scale, by_frame=by_frame, by_stride=by_stride, frames=frames, strides=strides
+    frames, basis = _pushed(estimate.frames, moment), estimate.basis
+    return NoiseEstimate(
+        scale,
+        by_frame,
+        by_stride,
+        estimate.sight,
+        frames,
+        strides,
+        gated,
+        basis + followed * (scale.position - basis),
     )
 
 

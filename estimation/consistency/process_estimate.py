@@ -14,22 +14,26 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from estimation.filters.ekf import informed
-from estimation.filters.filter import EKF, Filter
-from estimation.filters.gaussian import Gaussian, nis_of
+from estimation.consistency.filter_bank import (
+    LANES,
+    MEMBERS,
+    SPEED_LOWEST,
+    SPEED_MEMBERS,
+    SPEED_RATIO,
+    TURN_LOWEST,
+    TURN_MEMBERS,
+    TURN_RATIO,
+    Member,
+    Trial,
+    score_all,
+)
+from estimation.filters.filter import Filter
+from estimation.filters.gaussian import Gaussian
 from estimation.models.coordinated_turn import FollowerMotion, ProcessNoise, Spread, mean_motion
 from estimation.models.measurement import NO_MOTION, Measurement
 from estimation.tracking.track_point import TrackPoint
 from formation.kernel import kernel
-from formation.records import Rows, load, store
-
-TURN_MEMBERS, TURN_RATIO, TURN_LOWEST = 7, 4.0, 4.0**-5
-"""Members for the turn rate, ratio between them, and the lowest bandwidth: from 0.001 to 4 per second."""
-
-SPEED_MEMBERS, SPEED_RATIO, SPEED_LOWEST = 8, 8.0, 8.0**-7
-"""Members for the speed: from 5e-7 to 1 per second."""
-
-MEMBERS = TURN_MEMBERS + SPEED_MEMBERS
+from formation.records import Rows, load_across, store_across
 
 FORGOTTEN = 30.0
 """Time [s] in which scores are forgotten."""
@@ -43,7 +47,6 @@ _TOLD_SD = math.log(10.0)  # what is told is known to a factor of ten
 _SPEED_FALLING, _TURN_FALLING = 0.75, 0.25  # [1/s]: who drives calmly for a while need not be calm
 # Neither is a multiple of a usual spacing of frames, so that a microsecond doesn't matter.
 _INTERVAL_NS, _SETTLING_NS = 28_300_000, 1_003_000_000
-_LARGEST_NIS = 400.0  # a member further off starts again from the main filter
 _NS = 1e-9
 _SAME = 1e-6  # [s]
 
@@ -58,24 +61,6 @@ class ProcessLearning(NamedTuple):
     told: ProcessNoise
     speed: float
     turn: float
-
-
-class Member(NamedTuple):
-    """One filter of the bank: its belief, and the logarithm of its likelihood up to a constant of all."""
-
-    belief: Gaussian
-    score: float
-
-
-class Trial(NamedTuple):
-    """What a member is tried by: its noise, the time to a measurement, the share of scores kept, and that."""
-
-    noise: ProcessNoise
-    dt: float
-    kept: float
-    x: float
-    y: float
-    spread: Spread
 
 
 class LearnedProcess(NamedTuple):
@@ -122,7 +107,7 @@ def learn(
     measurement, belief, settled = point.measurement, point.belief, point.settled
     now_ns = measurement.capture_ns
     if not learned.begun:
-        return _waiting(learned, bank, measurement, belief, settled)
+        return _waiting(learned, bank, measurement, belief, settled, rules)
     since_ns = now_ns - learned.ended_ns
     count, later_ns = learned.together + 1, learned.later_ns + since_ns
     x, y = learned.x + measurement.x, learned.y + measurement.y
@@ -186,13 +171,18 @@ def _score_as_found(bank: Rows[Member], found: float, told: float, turn: bool) -
         first, count, tried, ratio = 0, TURN_MEMBERS, TURN_LOWEST, TURN_RATIO
     for k in range(first, first + count):
         score = _prior(math.log(tried / found)) - _prior(math.log(tried / told))
-        store(bank, k, load(Member, bank, k)._replace(score=score))
+        store_across(bank, LANES, k, load_across(Member, bank, LANES, k)._replace(score=score))
         tried = tried * ratio
 
 
 @kernel
 def _waiting(
-    learned: LearnedProcess, bank: Rows[Member], measurement: Measurement, belief: Gaussian, settled: bool
+    learned: LearnedProcess,
+    bank: Rows[Member],
+    measurement: Measurement,
+    belief: Gaussian,
+    settled: bool,
+    rules: ProcessLearning,
 ) -> LearnedProcess:
     """Start the bank from the main filter's belief once its track has been settled for a while.
 
@@ -205,10 +195,23 @@ def _waiting(
         return learned._replace(settled_ns=now_ns)
     if now_ns - learned.settled_ns < _SETTLING_NS:
         return learned
-    for k in range(MEMBERS):
-        # Scores of zero where there are none yet: rows begin with that.
-        store(bank, k, load(Member, bank, k)._replace(belief=belief))
+    _begin(bank, belief, rules)
     return _emptied(learned._replace(begun=True, at_ns=now_ns), measurement)
+
+
+@kernel(inline=False)
+def _begin(bank: Rows[Member], belief: Gaussian, rules: ProcessLearning) -> None:
+    """Start all members from a belief."""
+    turn, speed = _range_of(rules, True), _range_of(rules, False)
+    for k in range(LANES):
+        prior = 0.0
+        if k < TURN_MEMBERS:
+            prior = _prior(turn.lowest + turn.step * k)
+        elif k < MEMBERS:
+            prior = _prior(speed.lowest + speed.step * (k - TURN_MEMBERS))
+        # Scores of zero where there are none yet: rows begin with that.
+        member = load_across(Member, bank, LANES, k)
+        store_across(bank, LANES, k, member._replace(belief=belief, prior=prior))
 
 
 @kernel
@@ -243,62 +246,67 @@ def _scored(
     dt = (due_ns - learned.at_ns) * _NS
     motion = _way_of(learned, measurement, dt)
     kept, found = math.exp(-dt / FORGOTTEN), learned_noise(learned, rules)
-    tried_turn, tried_speed = rules.turn * TURN_LOWEST, rules.speed * SPEED_LOWEST
-    for k in range(MEMBERS):
-        noise = found
-        if k < TURN_MEMBERS:
-            noise = found._replace(q_u=tried_turn)
-            tried_turn = tried_turn * TURN_RATIO
-        else:
-            noise = found._replace(q_v=tried_speed)
-            tried_speed = tried_speed * SPEED_RATIO
-        _score(bank, k, Trial(noise, dt, kept, x, y, spread), motion, belief, estimator)
-    speed = _taken(bank, rules.told.q_v / rules.speed, learned.speed, dt, False)
-    turn = _taken(bank, rules.told.q_u / rules.turn, learned.turn, dt, True)
+    _noise_by_members(bank, found, rules)
+    score_all(bank, Trial(found, dt, kept, x, y, spread), motion, belief, estimator)
+    speed = _taken(bank, rules, learned.speed, dt, False)
+    turn = _taken(bank, rules, learned.turn, dt, True)
     return _emptied(learned._replace(speed=speed, turn=turn, at_ns=due_ns), measurement)
 
 
 @kernel
-def _score(
-    bank: Rows[Member], k: int, trial: Trial, motion: FollowerMotion, belief: Gaussian, estimator: Filter
-) -> None:
-    """Move a member on to a measurement, score it by that, and let it take it in."""
-    member, spread = load(Member, bank, k), trial.spread
-    one = estimator._replace(kind=EKF, noise=trial.noise)
-    prior = one.predict(member.belief, trial.dt, motion)
-    nis = nis_of(prior, trial.x, trial.y, spread)
-    a, b, c = prior.x_x + spread.xx, prior.x_y + spread.xy, prior.y_y + spread.yy
-    score = trial.kept * member.score - 0.5 * (min(nis, _LARGEST_NIS) + math.log(a * c - b * b))
-    if nis <= _LARGEST_NIS:
-        store(bank, k, Member(informed(prior, trial.x, trial.y, spread), score))
-    else:
-        store(bank, k, Member(belief, score))
+def _noise_by_members(bank: Rows[Member], found: ProcessNoise, rules: ProcessLearning) -> None:
+    """Give every member its noise: what is found, with one density in the place of that."""
+    tried_turn, tried_speed = rules.turn * TURN_LOWEST, rules.speed * SPEED_LOWEST
+    for k in range(LANES):
+        q_v, q_u = found.q_v, found.q_u
+        if k < TURN_MEMBERS:
+            q_u = tried_turn
+            tried_turn = tried_turn * TURN_RATIO
+        elif k < MEMBERS:
+            q_v = tried_speed
+            tried_speed = tried_speed * SPEED_RATIO
+        store_across(bank, LANES, k, load_across(Member, bank, LANES, k)._replace(q_v=q_v, q_u=q_u))
+
+
+class Range(NamedTuple):
+    """Where the bandwidths of members lie: logarithms of the lowest to the told one, and of their ratio."""
+
+    first: int
+    members: int
+    lowest: float
+    step: float
 
 
 @kernel
-def _taken(bank: Rows[Member], told: float, before: float, dt: float, turn: bool) -> float:
-    """Ratio to the told bandwidth to go on with: the likeliest, but no faster down than leaders may calm."""
-    first, count, lowest, ratio = TURN_MEMBERS, SPEED_MEMBERS, SPEED_LOWEST, SPEED_RATIO
-    falling = _SPEED_FALLING
+def _range_of(rules: ProcessLearning, turn: bool) -> Range:
+    """Range of the members that differ by the turn rate's noise, or by the speed's."""
     if turn:
-        first, count, lowest, ratio = 0, TURN_MEMBERS, TURN_LOWEST, TURN_RATIO
-        falling = _TURN_FALLING
-    lowest, step = math.log(lowest / told), math.log(ratio)
-    best, highest = 0, _posterior(bank, first, lowest)
+        told = rules.told.q_u / rules.turn
+        return Range(0, TURN_MEMBERS, math.log(TURN_LOWEST / told), math.log(TURN_RATIO))
+    told = rules.told.q_v / rules.speed
+    return Range(TURN_MEMBERS, SPEED_MEMBERS, math.log(SPEED_LOWEST / told), math.log(SPEED_RATIO))
+
+
+@kernel
+def _taken(bank: Rows[Member], rules: ProcessLearning, before: float, dt: float, turn: bool) -> float:
+    """Ratio to the told bandwidth to go on with: the likeliest, but no faster down than leaders may calm."""
+    falling = _TURN_FALLING if turn else _SPEED_FALLING
+    first, count, lowest, step = _range_of(rules, turn)
+    best, highest = 0, _posterior(bank, first)
     for k in range(1, count):
-        here = _posterior(bank, first + k, lowest + step * k)
+        here = _posterior(bank, first + k)
         if here > highest:
             best, highest = k, here
     peak = lowest + step * best
     inside = 0 < best < count - 1
     if inside:
-        below = highest - _posterior(bank, first + best - 1, peak - step)
-        above = highest - _posterior(bank, first + best + 1, peak + step)
+        below = highest - _posterior(bank, first + best - 1)
+        above = highest - _posterior(bank, first + best + 1)
         peak += _vertex(below, above, step)
     total, mean = 0.0, 0.0
     for k in range(count):
         off = lowest + step * k
-        weight = math.exp(_posterior(bank, first + k, off) - highest)
+        weight = math.exp(_posterior(bank, first + k) - highest)
         # Around the peak members stand too far apart to tell where it is by their weights alone.
         near = inside and best - 1 <= k <= best + 1
         total += weight
@@ -307,9 +315,10 @@ def _taken(bank: Rows[Member], told: float, before: float, dt: float, turn: bool
 
 
 @kernel
-def _posterior(bank: Rows[Member], k: int, off: float) -> float:
-    """Score of a member with what is told: its logarithm is off by this much from the told one."""
-    return load(Member, bank, k).score + _prior(off)
+def _posterior(bank: Rows[Member], k: int) -> float:
+    """Score of a member with what is told."""
+    member = load_across(Member, bank, LANES, k)
+    return member.score + member.prior
 
 
 @kernel

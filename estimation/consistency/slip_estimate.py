@@ -15,20 +15,20 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from estimation.consistency.process_estimate import MEMBERS, Member
+from estimation.consistency.filter_bank import LANES, Member
 from estimation.filters.ekf import informed
 from estimation.filters.filter import EKF, Filter
 from estimation.filters.gaussian import Gaussian, nis_of
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import NO_MOTION
-from estimation.tracking.track_point import RESTARTED, USED, TrackPoint
+from estimation.tracking.track_point import GATED, USED, TrackPoint
 from formation.kernel import kernel
 from formation.records import Rows, load, store
 
-SLIP_MEMBERS, SLIP_RATIO, SLIP_LOWEST = 5, 10.0 ** (1.0 / 3.0), 0.1
-"""Filters, ratio between their deviations, and the lowest over what is told: from a tenth to twice that."""
+SLIP_MEMBERS, SLIP_RATIO, SLIP_LOWEST = 6, 10.0 ** (1.0 / 3.0), 0.1
+"""Filters, ratio between their deviations, and the lowest over what is told: a tenth to five times that."""
 
-BANK = MEMBERS + SLIP_MEMBERS
+BANK = LANES + SLIP_MEMBERS
 """Rows of a bank with room for these behind those for the process noise."""
 
 FORGOTTEN = 30.0
@@ -46,7 +46,8 @@ class LearnedSlip(NamedTuple):
 
     scale: deviations of the follower's motion over those told. begun: whether the members run. at_ns: time
     of their beliefs. seen_ns: capture of the newest point looked at. way_s, way: time [s] since ``at_ns``
-    over which the way is known, and the sums of its motion over that, its variances times time.
+    over which the way is known, and the sums of its motion over that, its variances times time. gated:
+    whether that newest point was not believed.
     """
 
     scale: float
@@ -55,9 +56,10 @@ class LearnedSlip(NamedTuple):
     seen_ns: int
     way_s: float
     way: FollowerMotion
+    gated: bool
 
 
-SLIP_AS_TOLD = LearnedSlip(1.0, False, 0, 0, 0.0, NO_MOTION)
+SLIP_AS_TOLD = LearnedSlip(1.0, False, 0, 0, 0.0, NO_MOTION, gated=False)
 
 
 @kernel
@@ -67,18 +69,23 @@ def with_slip(motion: FollowerMotion, learned: LearnedSlip) -> FollowerMotion:
 
 
 @kernel(inline=False)
-def learn_slip(learned: LearnedSlip, bank: Rows[Member], point: TrackPoint, estimator: Filter) -> LearnedSlip:
-    """Learn from a point of a track to which the follower's way is known for good."""
+def learn_slip(
+    learned: LearnedSlip, bank: Rows[Member], point: TrackPoint, least: float, estimator: Filter
+) -> LearnedSlip:
+    """Learn from a point of a track to which the follower's way is known for good; ``least``: its scale."""
     now_ns = point.measurement.capture_ns
     if now_ns <= learned.seen_ns:
         return learned
     learned = learned._replace(seen_ns=now_ns)
-    if not point.settled or not point.measurement.has_way or point.verdict == RESTARTED:
+    # One that alone was not believed is an outlier; one after the other, and the way there may be to blame.
+    outlier = point.verdict == GATED and not learned.gated
+    learned = learned._replace(gated=point.verdict == GATED)
+    if not point.measurement.has_way or not (point.settled or learned.begun):
         return learned._replace(begun=False)
     if not learned.begun:
         if point.verdict != USED:
             return learned
-        for k in range(MEMBERS, BANK):
+        for k in range(LANES, BANK):
             # Scores of zero where there are none yet: rows begin with that.
             store(bank, k, load(Member, bank, k)._replace(belief=point.belief))
         nowhere = FollowerMotion(0.0, 0.0, 0.0, 0.0)
@@ -91,12 +98,13 @@ def learn_slip(learned: LearnedSlip, bank: Rows[Member], point: TrackPoint, esti
         was.sd_u2 + way.sd_u2 * way.sd_u2 * dt,
     )
     learned = learned._replace(way_s=learned.way_s + dt, way=added)
-    if now_ns - learned.at_ns < _INTERVAL_NS or point.verdict != USED:
+    if now_ns - learned.at_ns < _INTERVAL_NS or outlier:
         return learned
     if abs(learned.way_s - (now_ns - learned.at_ns) * _NS) > _SAME:
         # Something came late in between, so that part of the way is missing.
         return learned._replace(begun=False)
-    return _scored(learned, bank, point, estimator)
+    scored = _scored(learned, bank, point, estimator)
+    return scored._replace(scale=max(least, scored.scale))
 
 
 @kernel
@@ -108,13 +116,13 @@ def _scored(learned: LearnedSlip, bank: Rows[Member], point: TrackPoint, estimat
     mean = FollowerMotion(way.v2 * by, way.u2 * by, math.sqrt(way.sd_v2 * by), math.sqrt(way.sd_u2 * by))
     highest = -math.inf
     one = estimator._replace(kind=EKF, noise=point.noise)
-    for k in range(MEMBERS, BANK):
+    for k in range(LANES, BANK):
         motion = mean._replace(sd_v2=off * mean.sd_v2, sd_u2=off * mean.sd_u2)
         prior = one.predict(load(Member, bank, k).belief, dt, motion)
         highest = max(highest, _score(bank, k, kept, prior, point))
         off = off * SLIP_RATIO
     total, sum_, apart = 0.0, 0.0, math.log(SLIP_LOWEST)
-    for k in range(MEMBERS, BANK):
+    for k in range(LANES, BANK):
         told = apart / _TOLD_SD
         weight = math.exp(load(Member, bank, k).score - highest) / (1.0 + 0.5 * told * told)
         total, sum_ = total + weight, sum_ + weight * apart
@@ -134,9 +142,10 @@ def _score(bank: Rows[Member], k: int, kept: float, prior: Gaussian, point: Trac
     seen = point.measurement
     nis, spread = nis_of(prior, seen.x, seen.y, seen.spread), seen.spread
     a, b, c = prior.x_x + spread.xx, prior.x_y + spread.xy, prior.y_y + spread.yy
-    score = kept * load(Member, bank, k).score - 0.5 * (min(nis, _LARGEST_NIS) + math.log(a * c - b * b))
+    member = load(Member, bank, k)
+    score = kept * member.score - 0.5 * (min(nis, _LARGEST_NIS) + math.log(a * c - b * b))
     if nis <= _LARGEST_NIS:
-        store(bank, k, Member(informed(prior, seen.x, seen.y, spread), score))
+        store(bank, k, member._replace(belief=informed(prior, seen.x, seen.y, spread), score=score))
     else:
-        store(bank, k, Member(point.belief, score))
+        store(bank, k, member._replace(belief=point.belief, score=score))
     return score

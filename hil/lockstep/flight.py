@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controllers.follower import Command
-from estimation.consistency.process_estimate import Member
+from estimation.consistency.filter_bank import Member
 from estimation.consistency.slip_estimate import BANK
 from estimation.own_motion.odometry_check import WayEntry
 from estimation.own_motion.odometry_history import MotionSample

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.station_keeper import at_station
-from estimation.consistency.process_estimate import Member
+from estimation.consistency.filter_bank import Member
 from estimation.consistency.slip_estimate import BANK
 from estimation.filters.filter import Filter
 from estimation.own_motion.odometry_check import WayEntry
@@ -62,7 +62,7 @@ _SOON_S = 3.0  # nearly every leader has set off by then, with less noise to dra
 _SPARE_S = 0.5
 _NS = 1e-9
 _LEAST_ROOM = 64
-_SPARE_RATE = 1.5  # small rings stay in the processor's cache
+_SPARE_RATE = 1.25  # small rings stay in the processor's cache
 _MORE_COMMANDS_HZ = 25.0  # of the estimator's ticks, and one for the stop
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from estimation.consistency.process_estimate import Member
+from estimation.consistency.filter_bank import Member
 from estimation.own_motion.odometry_check import WayEntry
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.own_motion.own_track import OwnPoint

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controllers.guard import CLOCK_TOLERANCE_NS
+from estimation.consistency.filter_bank import Member
 from estimation.consistency.noise_estimate import NOISE_AS_TOLD, kept_noise
-from estimation.consistency.process_estimate import NOTHING_LEARNED, Member
+from estimation.consistency.process_estimate import NOTHING_LEARNED
 from estimation.consistency.slip_estimate import SLIP_AS_TOLD
 from estimation.models.measurement import PairSeen
 from estimation.own_motion.odometry_check import UNCHECKED, OdometrySample, WayEntry, without_track

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from estimation.consistency.filter_bank import Member
 from estimation.consistency.noise_estimate import NOISE_GIVEN, NoiseEstimate, NoiseLearning
-from estimation.consistency.process_estimate import LearnedProcess, Member, ProcessLearning
+from estimation.consistency.process_estimate import LearnedProcess, ProcessLearning
 from estimation.consistency.slip_estimate import LearnedSlip
 from estimation.filters.filter import Filter
 from estimation.models.measurement import PoseNoise

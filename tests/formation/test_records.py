@@ -17,10 +17,12 @@ from formation.records import (
     fields_of,
     is_record,
     load,
+    load_across,
     row_of,
     rows_of,
     size,
     store,
+    store_across,
     within,
 )
 from tests.bits import same_bits
@@ -78,6 +80,42 @@ def test_a_part_of_a_row_is_changed_where_it_is(records: list[Outer], real: floa
     for rows in (compiled, plain):
         same_bits(load(Outer, rows, at), expected)
         same_bits(load(Outer, rows, 0), records[0])
+
+
+class Two(NamedTuple):
+    first: float
+    second: float
+
+
+class Pair(NamedTuple):
+    real: float
+    two: Two
+
+
+@entry
+def exchanged_across(rows: Rows[Pair], k: int, real: float) -> float:
+    lent = borrowed(rows)
+    before = load_across(Pair, lent, 3, k)
+    store_across(lent, 3, k, Pair(real, Two(before.real, before.two.first)))
+    return before.two.second
+
+
+reals = st.lists(st.floats(), min_size=9, max_size=9)
+
+
+@given(reals, st.integers(0, 2), st.floats())
+def test_records_lie_field_by_field(numbers: list[float], k: int, real: float) -> None:
+    compiled, plain = rows_of(Pair, 3), rows_of(Pair, 3)
+    for rows in (compiled, plain):
+        for each in range(3):
+            first, *rest = numbers[3 * each : 3 * each + 3]
+            store_across(rows, 3, each, Pair(first, Two(*rest)))
+        np.testing.assert_array_equal(columns_of(rows).view(np.float64)[:3], numbers[::3])
+    first, second, third = numbers[3 * k : 3 * k + 3]
+    same_bits(exchanged_across(compiled, k, real), third)
+    same_bits(interpreted(exchanged_across)(plain, k, real), third)
+    assert columns_of(compiled).tobytes() == columns_of(plain).tobytes()
+    same_bits(load_across(Pair, plain, 3, k), Pair(real, Two(first, second)))
 
 
 @given(st.lists(outers, min_size=2, max_size=5))

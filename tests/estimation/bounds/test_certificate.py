@@ -11,7 +11,9 @@ import pytest
 from estimation.bounds.assumptions import Assumptions
 from estimation.bounds.bound_check import SpeedInputs, h_of
 from estimation.bounds.certificate import certify
+from formation.error_set_kernels import ErrorModel
 from formation.invariant_set import Disturbed, InvariantSet, invariant_set
+from formation.joint_set import Aside, joint_set
 from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
 from formation.station import Side
@@ -63,6 +65,10 @@ def test_every_claim_says_what_it_assumes_and_why_it_has_no_figures() -> None:
         ({"eps": 1.6e-3}, "formation_with_errors", "worst belief"),
         ({"speeds": SpeedRange(0.079, 0.081)}, "formation_with_errors", "constant turn"),
         ({}, "formation_any_speed", "saddle"),
+        ({}, "formation_with_alpha2", "up to 0.0152 m/s"),
+        ({"mu2": 0.05}, "formation_with_alpha2", "computed, not proved"),
+        ({"speeds": SpeedRange(0.079, 0.081)}, "formation_with_alpha2", "constant speed"),
+        ({"unknown_steering": "other steering"}, "formation_with_alpha2", "other steering"),
     ],
 )
 def test_what_cannot_be_guaranteed_is_not(change: dict[str, Any], claim: str, word: str) -> None:
@@ -243,6 +249,29 @@ def test_on_the_left_the_formation_is_the_mirror_image() -> None:
     assert (left.h, left.rates) == (right.h, right.rates)
 
 
+def test_the_set_with_alpha2_is_that_of_its_model_and_wider_than_without() -> None:
+    given = replace(TURTLEBOT3, eps=4e-4)
+    found = certify(given)
+    model = ErrorModel(1.5, 0.2, 20.0, 0.08, 0.7, found.velocity_error)
+    joint = joint_set(model, Aside(2.0))
+    assert joint is not None
+    figures, still = found.formation_with_alpha2.figures, found.formation_with_errors.figures
+    assert figures == {
+        "rho_min": joint.rho_min,
+        "rho_max": joint.rho_max,
+        "alpha1_min": joint.alpha1_min,
+        "alpha1_max": joint.alpha1_max,
+        "alpha2_within": joint.alpha2_within,
+        "W": found.velocity_error,
+    }
+    assert figures["rho_min"] < still["rho_min"] < still["rho_max"] < figures["rho_max"]
+    assumes = found.formation_with_alpha2.assumes
+    assert assumes[3] == "the whole system (3) under laws (4) and (8), without limits or lag"
+    assert f"within {joint.alpha2_within:.3g} rad" in assumes[-1]
+    left = certify(replace(given, side=Side.LEFT)).formation_with_alpha2
+    assert left.figures == mirrored(figures)
+
+
 def test_any_speed_means_every_speed_that_the_leader_may_drive() -> None:
     given = replace(TURTLEBOT3, k_u=0.3)
     anywhere = certify(replace(given, speeds=SpeedRange(given.v_eps, given.k_v)))
@@ -258,7 +287,7 @@ def test_the_margin_of_steering_is_that_of_a_constant_speed() -> None:
 
 def test_where_the_theory_does_not_speak_nothing_is_said_of_the_formation() -> None:
     found = certify(replace(QUIET, unproved="a station not abreast"))
-    names = ("formation", "formation_any_speed", "formation_with_errors", "k_u_star")
+    names = ("formation", "formation_any_speed", "formation_with_errors", "formation_with_alpha2", "k_u_star")
     for name in names:
         assert (found.claims()[name].figures, found.claims()[name].why) == ({}, "a station not abreast")
     assert list(found.claims()) == ["rates", "estimates", "h", "alpha2_ultimate", *names]

@@ -10,19 +10,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.random_leaders import random_leader
-from estimation.consistency.process_estimate import (
+from estimation.consistency.filter_bank import (
+    LANES,
     MEMBERS,
-    NOTHING_LEARNED,
-    SHARE,
     SPEED_LOWEST,
     SPEED_MEMBERS,
     SPEED_RATIO,
     TURN_LOWEST,
     TURN_MEMBERS,
     TURN_RATIO,
-    LearnedProcess,
     Member,
+)
+from estimation.consistency.process_estimate import (
+    NOTHING_LEARNED,
+    SHARE,
+    LearnedProcess,
     ProcessLearning,
+    _begin,
     _posterior,
     _taken,
     _vertex,
@@ -39,7 +43,7 @@ from estimation.models.measurement import FrontEnd, Measurement, PoseNoise, meas
 from estimation.models.motion import Vector
 from estimation.tracking.track_point import TrackPoint, begun
 from formation.pose import Pose
-from formation.records import Rows, load, rows_of, store
+from formation.records import Rows, load_across, rows_of, store_across
 
 LIMITS = LeaderLimits(v_eps=0.04, k_v=0.1, k_u=0.7)
 SD, STEP = 1e-3, 1.0 / 30.0
@@ -74,7 +78,7 @@ def found_for(
     truth = ProcessNoise.by_rule(LIMITS, turn, speed)
     start = np.array([0.0, 0.0, 0.08, 0.0, 0.0])
     states = random_leader(generator, start, round(seconds / STEP), STEP, truth)
-    estimator, bank, learned = main_filter(rules), rows_of(Member, MEMBERS), NOTHING_LEARNED
+    estimator, bank, learned = main_filter(rules), rows_of(Member, LANES), NOTHING_LEARNED
     belief = estimator.start(sighted(generator, 0, states[0]))._replace(vx=0.08, vx_vx=1e-6, vy_vy=1e-6)
     for k, state in enumerate(states):
         measurement = sighted(generator, k + 1, state)
@@ -100,7 +104,7 @@ def test_the_bandwidths_of_a_leader_are_found_whatever_is_told(
 
 def test_before_the_track_has_settled_it_is_as_told() -> None:
     rules, generator = learning(0.5, 0.01), np.random.default_rng(1)
-    estimator, bank, learned = main_filter(rules), rows_of(Member, MEMBERS), NOTHING_LEARNED
+    estimator, bank, learned = main_filter(rules), rows_of(Member, LANES), NOTHING_LEARNED
     for k in range(60):
         measurement = sighted(generator, k, np.zeros(5))
         learned = learn(learned, bank, begun(measurement, estimator), rules, estimator)
@@ -114,7 +118,7 @@ def test_a_new_track_starts_the_bank_anew_and_keeps_what_was_learned() -> None:
     learned, bank = found_for(0.05, 0.001, rules)
     again = restarted(learned)
     assert (again.speed, again.turn, again.begun) == (learned.speed, learned.turn, False)
-    scores = [load(Member, bank, k).score for k in range(MEMBERS)]
+    scores = [load_across(Member, bank, LANES, k).score for k in range(MEMBERS)]
     there = np.array([5.0, 5.0, 0.08, 0.0, 0.0])
     k = 1000
     while not again.begun:
@@ -123,17 +127,18 @@ def test_a_new_track_starts_the_bank_anew_and_keeps_what_was_learned() -> None:
         here = point(measurement, estimator.start(measurement), estimator)
         again = learn(again, bank, here, rules, estimator)
         k += 1
-    assert [load(Member, bank, k).score for k in range(MEMBERS)] == scores
-    assert load(Member, bank, 3).belief.x == pytest.approx(5.0, abs=0.1)
+    assert [load_across(Member, bank, LANES, k).score for k in range(MEMBERS)] == scores
+    assert load_across(Member, bank, LANES, 3).belief.x == pytest.approx(5.0, abs=0.1)
 
 
 @pytest.mark.parametrize("k", range(TURN_MEMBERS, MEMBERS))
 def test_a_little_evidence_for_one_member_does_not_take_the_noise_there(k: int) -> None:
     """Where nothing tells members apart it is near what is told, and a nat for one of them changes little."""
-    bank = rows_of(Member, MEMBERS)
-    none = _taken(bank, 0.01, 0.0, 0.0, False)
-    store(bank, k, load(Member, bank, k)._replace(score=1.0))
-    one = _taken(bank, 0.01, 0.0, 0.0, False)
+    bank, rules = rows_of(Member, LANES), learning(0.5, 0.01)
+    _begin(bank, load_across(Member, bank, LANES, 0).belief, rules)
+    none = _taken(bank, rules, 0.0, 0.0, False)
+    store_across(bank, LANES, k, load_across(Member, bank, LANES, k)._replace(score=1.0))
+    one = _taken(bank, rules, 0.0, 0.0, False)
     assert abs(math.log(none)) < math.log(5.0)
     assert abs(math.log(one / none)) < math.log(8.0)
 
@@ -147,7 +152,7 @@ def test_with_another_noise_what_was_found_takes_the_place_of_what_is_told() -> 
     turns = [math.log(TURN_LOWEST * TURN_RATIO**k / 0.5) for k in range(TURN_MEMBERS)]
     speeds = [math.log(SPEED_LOWEST * SPEED_RATIO**k / 0.01) for k in range(SPEED_MEMBERS)]
     for first, offs, found in ((0, turns, learned.turn), (TURN_MEMBERS, speeds, learned.speed)):
-        likely = [_posterior(bank, first + k, off) for k, off in enumerate(offs)]
+        likely = [_posterior(bank, first + k) for k in range(len(offs))]
         apart = [abs(off - math.log(found)) for off in offs]
         assert np.argsort(likely)[::-1].tolist() == np.argsort(apart).tolist()
         assert max(likely) - min(likely) < 5.0

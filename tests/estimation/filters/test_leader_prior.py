@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.filters.gaussian import Gaussian
-from estimation.filters.leader_prior import standing_noise, within_limits
+from estimation.filters.leader_prior import standing_noise, usual_speed, within_limits
 from estimation.models.coordinated_turn import LeaderLimits, ProcessNoise
 
 LIMITS = LeaderLimits(0.04, 0.2, 0.6)
@@ -70,3 +70,29 @@ def test_nobody_stands_who_is_not_known_to() -> None:
 def test_no_time_changes_nothing() -> None:
     b = belief(0.1, 0.0, 0.5, 0.05, 0.05)
     assert within_limits(b, 0.0, NOISE, LIMITS) == b
+
+
+@pytest.mark.parametrize("speed", [0.02, 0.15, 0.4])
+@pytest.mark.parametrize("sd", [0.002, 0.03, 0.2])
+def test_a_speed_is_told_with_those_that_leaders_have(speed: float, sd: float) -> None:
+    """Two Gaussians, one of the belief and one of the limits, by hand."""
+    seen = belief(0.6 * speed, 0.8 * speed, 0.1, sd, 0.05)
+    variance = (LIMITS.k_v - LIMITS.v_eps) ** 2 / 12.0
+    gain = sd**2 / (sd**2 + variance)
+    told = usual_speed(seen, LIMITS)
+    assert told.speed == pytest.approx(speed + gain * (0.5 * (LIMITS.k_v + LIMITS.v_eps) - speed), rel=1e-9)
+    assert math.atan2(told.vy, told.vx) == pytest.approx(math.atan2(0.8, 0.6), rel=1e-9)
+    along = 0.36 * told.vx_vx + 0.96 * told.vx_vy + 0.64 * told.vy_vy
+    assert along == pytest.approx(sd**2 * (1.0 - gain), rel=1e-9)
+    across = 0.64 * told.vx_vx - 0.96 * told.vx_vy + 0.36 * told.vy_vy
+    assert across == pytest.approx(sd**2, rel=1e-9)
+
+
+def test_who_seems_to_stand_still_has_no_direction_to_be_told_a_speed_along() -> None:
+    still = belief(0.0, 0.0, 0.1, 0.01, 0.05)
+    assert usual_speed(still, LIMITS) == still
+
+
+def test_a_leader_of_one_speed_alone_is_left_alone() -> None:
+    seen = belief(0.1, 0.0, 0.1, 0.01, 0.05)
+    assert usual_speed(seen, LeaderLimits(0.2, 0.2, 0.6)) == seen

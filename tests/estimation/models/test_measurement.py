@@ -15,6 +15,7 @@ from estimation.models.measurement import (
     measure_body,
     measure_body_from_mocap,
     measure_world,
+    seen_in_range,
 )
 from formation.pose import Pose
 from formation.shape import Shape, follower_pose
@@ -85,3 +86,15 @@ def test_what_a_sensor_sees_is_told_from_the_wheel_axis(
     assert cmath.rect(*seen) == pytest.approx(leader, abs=1e-12)
     assert seen[0] >= 0.0
     assert from_sensor(rho, 0.0, (x, 0.0))[0] == pytest.approx(abs(rho + x))
+
+
+@given(st.floats(0.05, 5.0), angles)
+@settings(deadline=None)
+def test_of_what_is_seen_in_range_the_bearing_may_be_a_radian_off(rho: float, alpha2: float) -> None:
+    seen = measure_body(0, rho, alpha2, 0.01, 0.02, STANDING)
+    ranged = seen_in_range(seen)
+    along = np.array([math.cos(alpha2), math.sin(alpha2)])
+    across = np.array([-along[1], along[0]])
+    assert ranged.position.tolist() == seen.position.tolist()
+    assert along @ ranged.covariance @ along == pytest.approx(0.01**2)
+    assert across @ ranged.covariance @ across == pytest.approx(rho**2 * (1.0 + 0.02**2))

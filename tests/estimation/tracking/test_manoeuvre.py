@@ -13,12 +13,15 @@ from estimation.filters.gaussian import Gaussian
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, Spread
 from estimation.models.measurement import Measurement, PoseNoise, measure_world
 from estimation.tracking.manoeuvre import (
-    ALARM,
+    JUDGED,
     LARGEST_SHARE,
     LASTS,
     REMEMBERED,
+    SPEED_ALARM,
     SPEED_JUMPY,
+    TURN_ALARM,
     TURN_JUMPY,
+    TURN_LEAN,
     Manoeuvre,
     later,
     noticed,
@@ -60,43 +63,70 @@ def test_a_run_along_raises_the_noise_of_the_speed_and_one_across_that_of_the_tu
     heading: float, side: float
 ) -> None:
     along, wider = after([(2.0 * side, 0.0)] * 7, heading)
-    assert (along.speed_raised, along.speed_jumps, along.turn_raised) == (LASTS, 0.5, 0.0)
-    across, same = after([(0.0, 2.0 * side)] * 7, heading)
-    assert (across.turn_raised, across.turn_jumps, across.speed_raised) == (LASTS, 0.5, 0.0)
-    assert same == prior(heading)
+    assert (along.speed_raised, along.unjudged, along.turn_raised) == (LASTS, JUDGED, 0.0)
+    across, unsure = after([(0.0, 2.0 * side)] * 9, heading)
+    assert (across.turn_raised, across.turn_jumps, across.speed_raised) == (LASTS, 0.8, 0.0)
     noise = raised(NOISE, along, LIMITS)
     assert noise.q_v > 100.0 * NOISE.q_v
     assert noise.q_u == NOISE.q_u
     assert raised(NOISE, across, LIMITS).q_u > 5.0 * NOISE.q_u
     ahead = np.array([math.cos(heading), math.sin(heading)])
     grown = wider.covariance[2:4, 2:4] - prior(heading).covariance[2:4, 2:4]
-    assert grown @ np.array([-ahead[1], ahead[0]]) == pytest.approx(np.zeros(2), abs=1e-12)
+    aside = np.array([-ahead[1], ahead[0]])
+    assert grown @ aside == pytest.approx(np.zeros(2), abs=1e-12)
     assert ahead @ grown @ ahead > 0.0
+    # Turning makes the direction unsure, by the turn rate and together with it, and not the speed.
+    turned = unsure.covariance[2:, 2:] - prior(heading).covariance[2:, 2:]
+    assert turned[:2, :2] @ ahead == pytest.approx(np.zeros(2), abs=1e-12)
+    assert ahead @ turned[:2, 2] == pytest.approx(0.0, abs=1e-12)
+    assert turned[2, 2] > 0.0
+    assert np.linalg.eigvalsh(turned).min() > -1e-12
+    time = 2.0 * (aside @ turned[:2, 2]) / (0.08 * turned[2, 2])
+    assert aside @ turned[:2, :2] @ aside == pytest.approx(0.08**2 * turned[2, 2] * time**2 / 3.0)
+    assert time <= LASTS
 
 
 def test_outliers_alone_are_no_manoeuvre() -> None:
     """Not two in a row, however large, nor one now and then."""
-    assert 2.0 * (LARGEST_SHARE - 0.5) < ALARM
-    for outliers in ([(1e6, 1e6)] * 2, [(1e6, -1e6), *[(0.0, 0.0)] * 5] * 20):
+    assert 2.0 * (LARGEST_SHARE - 0.5) < SPEED_ALARM
+    assert 2.0 * TURN_LEAN * (LARGEST_SHARE - 0.5 * TURN_LEAN) < TURN_ALARM
+    for outliers in ([(1e6, 1e6)] * 2, [(1e6, -1e6), *[(0.0, 0.0)] * 11] * 20):
         manoeuvre, _ = after(outliers)
-        assert (manoeuvre.speed_jumps, manoeuvre.turn_jumps) == (0.0, 0.0)
+        assert (manoeuvre.speed_raised, manoeuvre.unjudged, manoeuvre.turn_jumps) == (0.0, 0.0, 0.0)
 
 
 def test_noise_hardly_ever_makes_an_alarm() -> None:
     generator, count = np.random.default_rng(5), 0
     manoeuvre, n = steady()._replace(settled_for=2.0), 20_000
     for along, across in generator.standard_normal((n, 2)).tolist():
-        manoeuvre = later(manoeuvre, FRAME, True)._replace(speed_jumps=0.0, turn_jumps=0.0)
+        manoeuvre = later(manoeuvre, FRAME, True)._replace(speed_raised=0.0, turn_jumps=0.0)
         manoeuvre, _ = noticed(manoeuvre, prior(0.3), seen(0.3, along, across), NOISE, LIMITS)
-        count += (manoeuvre.speed_jumps > 0.0) + (manoeuvre.turn_jumps > 0.0)
+        assert manoeuvre.speed_jumps == 0.0
+        count += (manoeuvre.speed_raised > 0.0) + (manoeuvre.turn_jumps > 0.0)
     assert 0 < count < n / 500
 
 
+@given(st.floats(-0.05, 0.05))
+def test_an_alarm_counts_as_a_jump_if_the_speed_is_another_one_afterwards(step: float) -> None:
+    """The prior's speed is known to 0.1 mm/s, before and after."""
+    manoeuvre = steady()._replace(settled_for=2.0)
+    manoeuvre, _ = noticed(manoeuvre, prior(0.3), seen(0.3, 0.0, 0.0), NOISE, LIMITS)
+    for _ in range(7):
+        manoeuvre = later(manoeuvre, FRAME, True)
+        manoeuvre, _ = noticed(manoeuvre, prior(0.3), seen(0.3, 2.0, 0.0), NOISE, LIMITS)
+    assert manoeuvre.speed_raised == LASTS
+    there = prior(0.3, 0.08 + step)
+    soon, _ = noticed(later(manoeuvre, 0.9 * JUDGED, True), there, seen(0.3, 0.0, 0.0), NOISE, LIMITS)
+    assert (soon.speed_jumps == 1.0) == (abs(step) > 3.0 * math.sqrt(2.0) * 1e-4)
+    late, _ = noticed(later(manoeuvre, 1.1 * JUDGED, True), there, seen(0.3, 0.0, 0.0), NOISE, LIMITS)
+    assert (late.unjudged, late.speed_jumps) == (0.0, 0.0)
+
+
 def test_what_is_raised_falls_back_and_that_a_leader_jumps_is_forgotten_slowly() -> None:
-    manoeuvre, _ = after([(2.0, 2.0)] * 7)
+    manoeuvre = after([(2.0, 2.0)] * 9)[0]._replace(speed_jumps=0.8)
     soon, late = later(manoeuvre, 1.5 * LASTS, True), later(manoeuvre, REMEMBERED, True)
     assert (soon.speed_raised, soon.turn_raised) == (0.0, 0.0)
-    jumpy = ProcessNoise.by_rule(LIMITS, 0.5 * TURN_JUMPY, 0.5 * SPEED_JUMPY)
+    jumpy = ProcessNoise.by_rule(LIMITS, 0.8 * TURN_JUMPY, 0.8 * SPEED_JUMPY)
     assert raised(NOISE, soon, LIMITS).q_v == pytest.approx(jumpy.q_v, rel=0.02)
     assert raised(NOISE, soon, LIMITS).q_u == pytest.approx(jumpy.q_u, rel=0.02)
     assert raised(NOISE, late, LIMITS) == NOISE
@@ -104,7 +134,7 @@ def test_what_is_raised_falls_back_and_that_a_leader_jumps_is_forgotten_slowly()
 
 
 def test_a_leader_that_stands_has_no_direction_to_tell_a_run_by() -> None:
-    started = Manoeuvre(7.0, 7.0, 7.0, 7.0, 0.1, 0.0, 0.0, 0.0, 0.0, 2.0)
+    started = steady()._replace(ahead=7.0, behind=7.0, left=7.0, right=7.0, running=0.1, settled_for=2.0)
     for speed in (0.0, 0.4 * LIMITS.v_eps):
         found, belief = noticed(started, prior(0.3, speed), seen(0.3, 3.0, 3.0), NOISE, LIMITS)
         assert (found.ahead, found.behind, found.left, found.right) == (0.0, 0.0, 0.0, 0.0)

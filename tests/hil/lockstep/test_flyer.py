@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from operator import attrgetter
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from controllers.guard import reason_of
 from estimation.tracking.estimate import Joint
@@ -189,16 +191,16 @@ def test_rings_have_a_power_of_two_of_rows(rate: float) -> None:
     told = [f"mocap.rate_hz={rate}", f"robot.odometry_rate_hz={rate}", "controller.max_age_s=0.77"]
     scenario = scenario_of("turtlebot3", told)
     rooms, desk = Flyer(scenario).rooms, EstimatorNode(scenario).rows_only(0).memory.desk
-    rings = [rooms.points, rooms.history, rooms.own, rooms.ways, rooms.sent, rooms.lab.underway]
-    rings += [
+    flown = (rooms.points, rooms.history, rooms.own, rooms.ways, rooms.sent, rooms.lab.underway)
+    live = (
         desk.points,
         desk.history,
         desk.own,
         desk.ways,
         ControllerNode(scenario).rows_only(0).desk.commands,
-    ]
-    for rows in rings:
-        assert len(rows).bit_count() == 1
+    )
+    for rows in (*flown, *live):
+        assert len(cast("NDArray[np.void]", rows)).bit_count() == 1
 
 
 def test_a_leader_that_never_sets_off_is_an_error() -> None:

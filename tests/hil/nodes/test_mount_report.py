@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from estimation.models.measurement import PoseNoise
-from estimation.tracking.mount_check import NO_MOUNT_CHECK, MountCheck, watched
+from estimation.tracking.mount_check import NO_MOUNT_CHECK, MountCheck, mount_checked
 from formation.mount import Mount, body_pose
 from formation.pose import Pose, advance
 from hil.lockstep.run import run_lockstep
@@ -29,7 +29,7 @@ def watching(mount: Mount) -> MountCheck:
     for k in range(600):
         pose = advance(pose, 0.1, 0.6 * math.sin(0.02 * k), 1.0 / 120.0)
         at_ns = round(1e9 * k / 120)
-        check = watched(check, at_ns, body_pose(pose, mount), PoseNoise(3e-4, 3.5e-3), False)
+        check = mount_checked(check, at_ns, body_pose(pose, mount), PoseNoise(3e-4, 3.5e-3), False)
     return check
 
 

@@ -177,6 +177,14 @@ def test_odometry_that_lies_is_named_and_the_track_takes_over(front_end: str) ->
     assert np.mean([e.u2 for e in found[300:]]) == pytest.approx(OWN.u, abs=0.05)
 
 
+def test_along_the_own_axes_poses_tell_the_turn_and_odometry_the_rates() -> None:
+    """Whatever odometry may be worth: the leader is known as well as without any."""
+    _, judged = fed(node_with("auto", "body"), driven_round(240, OWN))
+    _, alone = fed(node_with("mocap", "body"), frames(240))
+    assert [(e.v1, e.alpha1, e.u1) for e in judged] == [(e.v1, e.alpha1, e.u1) for e in alone]
+    assert np.std([e.u2 for e in judged[120:]]) < 0.1 * np.std([e.u2 for e in alone[120:]])
+
+
 def test_odometry_that_falls_silent_ages_and_gives_way() -> None:
     node = node_with("auto")
     events = [*driven_round(120, OWN), *frames(360)[120:]]
