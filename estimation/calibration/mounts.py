@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from estimation.calibration.smoothed_track import LocalFit, fitted_rates
 from estimation.models.measurement import PoseNoise
-from estimation.tracking.mount_check import NO_MOUNT_CHECK, mount_left, watched
+from estimation.tracking.mount_check import NO_MOUNT_CHECK, mount_checked, mount_left
 from formation.angles import FloatArray, wrap, wrapped
 from formation.mount import Mount
 from formation.pose import Pose
@@ -154,7 +154,7 @@ def short_drive_mount(stamps_ns: list[int], poses: list[Pose], noise: PoseNoise)
         check = NO_MOUNT_CHECK
         for at_ns, pose in zip(stamps_ns, poses, strict=True):
             robot = pose._replace(theta=wrapped(pose.theta - yaw))
-            check = watched(check, at_ns, robot, noise, False)
+            check = mount_checked(check, at_ns, robot, noise, False)
         left = mount_left(check)
         if not left.known:
             return NOTHING_FOUND

@@ -69,8 +69,10 @@ def with_slip(motion: FollowerMotion, learned: LearnedSlip) -> FollowerMotion:
 
 
 @kernel(inline=False)
-def learn_slip(learned: LearnedSlip, bank: Rows[Member], point: TrackPoint, estimator: Filter) -> LearnedSlip:
-    """Learn from a point of a track to which the follower's way is known for good."""
+def learn_slip(
+    learned: LearnedSlip, bank: Rows[Member], point: TrackPoint, least: float, estimator: Filter
+) -> LearnedSlip:
+    """Learn from a point of a track to which the follower's way is known for good; ``least``: its scale."""
     now_ns = point.measurement.capture_ns
     if now_ns <= learned.seen_ns:
         return learned
@@ -101,7 +103,8 @@ def learn_slip(learned: LearnedSlip, bank: Rows[Member], point: TrackPoint, esti
     if abs(learned.way_s - (now_ns - learned.at_ns) * _NS) > _SAME:
         # Something came late in between, so that part of the way is missing.
         return learned._replace(begun=False)
-    return _scored(learned, bank, point, estimator)
+    scored = _scored(learned, bank, point, estimator)
+    return scored._replace(scale=max(least, scored.scale))
 
 
 @kernel

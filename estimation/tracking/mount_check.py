@@ -73,7 +73,9 @@ class MountLeft(NamedTuple):
 
 
 @kernel
-def watched(check: MountCheck, capture_ns: int, pose: Pose, noise: PoseNoise, jumped: bool) -> MountCheck:
+def mount_checked(
+    check: MountCheck, capture_ns: int, pose: Pose, noise: PoseNoise, jumped: bool
+) -> MountCheck:
     """Check with the robot's newest pose; after a jump an arc begins anew."""
     if not check.begun or jumped:
         return check._replace(begun=True, since_ns=capture_ns, since=pose)

@@ -40,7 +40,7 @@ NO_TRAVEL = TravelWatch(False, 0.0, 0.0, 0, False, 0)
 
 
 @kernel
-def travelled(
+def direction_watched(
     watch: TravelWatch, belief: Gaussian, capture_ns: int, settled: bool, limits: LeaderLimits
 ) -> TravelWatch:
     """Watch with the belief after one more measurement, in a frame that does not turn; in their order.
@@ -60,11 +60,13 @@ def travelled(
 
 
 @kernel
-def watched(watch: TravelWatch, point: TrackPoint, lost_after: float, limits: LeaderLimits) -> TravelWatch:
+def travel_watched(
+    watch: TravelWatch, point: TrackPoint, lost_after: float, limits: LeaderLimits
+) -> TravelWatch:
     """Watch with the newest point of a track; one that begins anew after ``lost_after`` [s] knows nothing."""
     if point.verdict == GATED:
         return watch
     capture_ns, unsure = point.measurement.capture_ns, point.verdict == RESTARTED and not point.settled
     if unsure and (capture_ns - watch.at_ns) * _NS > lost_after:
         return TravelWatch(False, 0.0, 0.0, 0, False, watch.turned_ns)
-    return travelled(watch, point.belief, capture_ns, point.settled, limits)
+    return direction_watched(watch, point.belief, capture_ns, point.settled, limits)

@@ -10,7 +10,7 @@ import click
 
 from hil.commands.seconds import Seconds
 from hil.errors import UsageError
-from hil.log.report_json import print_json
+from hil.log.report_json import print_with_nulls
 
 if TYPE_CHECKING:
     from estimation.calibration.sensor_bias import SensorBias
@@ -75,7 +75,7 @@ def command(
     _say_mounts(found.mounts)
     _say_noise(found.noise)
     if as_json:
-        print_json(found.as_dict())
+        print_with_nulls(found.as_dict())
 
 
 def _say_mounts(found: Mounts) -> None:

@@ -123,11 +123,8 @@ def least_deviations(
     if scenario.estimator.front_end != "world" or noise.position <= 0.0:
         return {}
     truth = columns.truth
-    near: NDArray[np.bool_] | slice = inside(
-        truth.capture_ns, Span(columns.span.from_ns - WARM_UP_NS, columns.span.to_ns)
-    )
-    if np.all(near):
-        near = slice(None)
+    within = inside(truth.capture_ns, Span(columns.span.from_ns - WARM_UP_NS, columns.span.to_ns))
+    near: NDArray[np.bool_] | slice = slice(None) if np.all(within) else within
     heading, v1 = truth.leader[near, 2], truth.v1[near]
     velocity = (v1 * np.cos(heading), v1 * np.sin(heading))
     leader = np.column_stack([truth.leader[near, :2], *velocity, truth.u1[near]])

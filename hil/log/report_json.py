@@ -58,6 +58,11 @@ def print_json(result: Mapping[str, Any]) -> None:
     click.echo(as_json(result), file=_results.get())
 
 
+def print_with_nulls(result: Mapping[str, Any]) -> None:
+    """The same of one that is known already, in which null says that something is not."""
+    click.echo(json.dumps(result, allow_nan=False), file=_results.get())
+
+
 def write_json(result: Mapping[str, Any], path: Path) -> None:
     """Write a result to a file, indented."""
     path.write_text(as_json(result, indent=2) + "\n", encoding="utf-8")

@@ -16,7 +16,7 @@ from estimation.consistency.process_estimate import (
     learned_noise,
     restarted,
 )
-from estimation.consistency.slip_estimate import LearnedSlip, learn_slip
+from estimation.consistency.slip_estimate import SLIP_LOWEST, LearnedSlip, learn_slip
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import (
     Measurement,
@@ -42,8 +42,7 @@ from estimation.tracking.estimate import estimate_at, guessed_when_slow
 from estimation.tracking.follower_check import BELIEVED, MOUNT
 from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
 from estimation.tracking.follower_check import GATED as LEADER_OFF
-from estimation.tracking.mount_check import MountCheck, is_off
-from estimation.tracking.mount_check import watched as mount_watched
+from estimation.tracking.mount_check import MountCheck, is_off, mount_checked
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE, RESTARTED, USED, TrackPoint, with_motion
 from estimation.tracking.tracker import (
     INITIALISING,
@@ -57,7 +56,7 @@ from estimation.tracking.tracker import (
     reprocessed,
     status_of,
 )
-from estimation.tracking.travel_watch import TravelWatch, watched
+from estimation.tracking.travel_watch import TravelWatch, travel_watched
 from formation.kernel import kernel
 from formation.mount import robot_pose
 from formation.records import Rows, load, store, within
@@ -122,7 +121,7 @@ def take_frame(knowns: Rows[Known], memory: Memory, rules: Rules, capture_ns: in
     if taken.cause == BELIEVED or taken.cause == LEADER_OFF or taken.cause == FOLLOWER_OFF:
         jumped, checks = taken.verdict == RESTARTED, within(Known, knowns, 0, "mount_check")
         check = load(MountCheck, checks, 0)
-        store(checks, 0, mount_watched(check, capture_ns, seen.follower, using.noise, jumped))
+        store(checks, 0, mount_checked(check, capture_ns, seen.follower, using.noise, jumped))
     if learns:
         begins = load(Known, knowns, 0).process.begun and not begun
         learn_noise(knowns, memory, rules, Moment(capture_ns, seen), taken.cause != BELIEVED, begins)
@@ -198,12 +197,14 @@ def take(knowns: Rows[Known], memory: Memory, rules: Rules, measurement: Measure
         # Of the newest odometry may still come; the one before it has been folded with all there is.
         settled = point_at(points, added.ring, added.ring.length - 2)
         slips = within(Known, knowns, 0, "slip")
-        store(slips, 0, learn_slip(load(LearnedSlip, slips, 0), memory.bank, settled, rules.filter))
+        # Commands that were obeyed for a while may not be next time: of these only what is worse is learned.
+        least = 1.0 if rules.trust.lag > 0.0 else SLIP_LOWEST
+        store(slips, 0, learn_slip(load(LearnedSlip, slips, 0), memory.bank, settled, least, rules.filter))
     if rules.filter.in_world and not late:
         point, settings = newest(points, added.ring), rules.settings
         travels = within(Known, knowns, 0, "travel")
         travel = load(TravelWatch, travels, 0)
-        store(travels, 0, watched(travel, point, settings.lost_after, rules.filter.limits))
+        store(travels, 0, travel_watched(travel, point, settings.lost_after, rules.filter.limits))
     return Taken(added.verdict, cause, late)
 
 
@@ -229,6 +230,9 @@ def _learn(knowns: Rows[Known], memory: Memory, rules: Rules, verdict: int) -> N
     if point.period > SELDOM:
         return
     if point.measurement.has_way and rules.trust.lag > 0.0:
+        if point.measurement.framed:
+            # Dozens of frames within one error of the wheels would pass for as many proofs.
+            return
         # Where commands stand in for motion, what is seen across the line of sight tells how the follower
         # obeys, not how the leader drives.
         point = point._replace(measurement=seen_in_range(point.measurement))

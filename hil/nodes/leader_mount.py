@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from estimation.models.measurement import PoseNoise
-from estimation.tracking.mount_check import NO_MOUNT_CHECK, MountCheck, watched
+from estimation.tracking.mount_check import NO_MOUNT_CHECK, MountCheck, mount_checked
 from formation.mount import Mount, robot_pose
 from formation.pose import Pose
 
@@ -34,5 +34,5 @@ def with_leader(
         return watch._replace(begun=True, first=body.theta)
     if not watch.turns and body.theta == watch.first:
         return watch
-    check = watched(watch.check, capture_ns, robot_pose(body, mount), noise, False)
+    check = mount_checked(watch.check, capture_ns, robot_pose(body, mount), noise, False)
     return watch._replace(check=check, turns=True)

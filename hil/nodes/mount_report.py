@@ -60,9 +60,10 @@ def mount_findings(
             yaws.append(f"{_yaw_text(left, robot)}, expected 0")
         if left.known and surely_above(left.place, left.sd_place, NOTED_PLACE):
             pivots.append(_pivot_text(robot, left.place, left.sd_place, "further ahead of the wheel axis"))
-    aside = sideways_left(sideways)
+    aside, own = sideways_left(sideways), mount_left(check)
     # By a heading that is off, speed along it is no speed of the wheels.
-    if aside is not None and not yaws and surely_above(*aside, NOTED_PLACE):
+    straight = not (own.known and surely_above(own.yaw, own.sd_yaw, NOTED_YAW))
+    if aside is not None and straight and surely_above(*aside, NOTED_PLACE):
         pivots.append(_pivot_text("follower", *aside, "further left of the wheels' middle"))
     named = {"frame_yaw": yaws, "frame_pivot": pivots}
     return {name: "; ".join(texts) for name, texts in named.items() if texts}

@@ -209,8 +209,8 @@ def _judge_odometry(knowns: Rows[Known], memory: Memory, rules: Rules) -> None:
 
 @kernel
 def finds_odometry_noise(rules: Rules) -> bool:
-    """Whether the noise of odometry is found by the own track; of commands in its place a lag is told."""
-    return rules.noise_learning.learns and rules.trust.lag == 0.0
+    """Whether the own track tells the noise of odometry; along own axes a lag of commands is told for it."""
+    return rules.noise_learning.learns and (rules.filter.in_world or rules.trust.lag == 0.0)
 
 
 @kernel

@@ -74,9 +74,9 @@ class Drive:
         return self.point
 
     def learn(self, steps: int, learned: LearnedSlip = SLIP_AS_TOLD) -> LearnedSlip:
-        learned = learn_slip(learned, self.bank, self.point, self.estimator)
+        learned = learn_slip(learned, self.bank, self.point, SLIP_LOWEST, self.estimator)
         for _ in range(steps):
-            learned = learn_slip(learned, self.bank, self.step(learned), self.estimator)
+            learned = learn_slip(learned, self.bank, self.step(learned), SLIP_LOWEST, self.estimator)
         return learned
 
 
@@ -108,14 +108,14 @@ def test_rows_of_the_process_noise_are_left_alone() -> None:
 def test_a_point_that_was_seen_before_tells_nothing_new() -> None:
     drive = Drive(1.0)
     learned = drive.learn(30)
-    assert learn_slip(learned, drive.bank, drive.point, drive.estimator) == learned
+    assert learn_slip(learned, drive.bank, drive.point, SLIP_LOWEST, drive.estimator) == learned
 
 
 def test_members_start_anew_with_the_track_and_what_was_found_is_kept() -> None:
     drive = Drive(0.2)
     learned = drive.learn(300)
     lost = begun(drive.step(learned).measurement._replace(has_way=False), drive.estimator)
-    after = learn_slip(learned, drive.bank, lost, drive.estimator)
+    after = learn_slip(learned, drive.bank, lost, SLIP_LOWEST, drive.estimator)
     assert (after.begun, after.scale) == (False, learned.scale)
 
 
@@ -123,10 +123,10 @@ def test_a_way_with_a_gap_is_not_scored() -> None:
     drive = Drive(1.0)
     learned = drive.learn(30)
     while learned.at_ns == drive.point.measurement.capture_ns or learned.way_s < 0.15:
-        learned = learn_slip(learned, drive.bank, drive.step(learned), drive.estimator)
+        learned = learn_slip(learned, drive.bank, drive.step(learned), SLIP_LOWEST, drive.estimator)
     scores = [load(Member, drive.bank, k).score for k in range(LANES, BANK)]
     short = drive.step(learned)._replace(way_s=0.04)
-    after = learn_slip(learned, drive.bank, short, drive.estimator)
+    after = learn_slip(learned, drive.bank, short, SLIP_LOWEST, drive.estimator)
     assert not after.begun
     assert [load(Member, drive.bank, k).score for k in range(LANES, BANK)] == scores
 
@@ -135,9 +135,20 @@ def test_an_outlier_is_not_scored_and_refused_ones_in_a_row_are() -> None:
     drive = Drive(1.0)
     learned = drive.learn(30)
     while learned.way_s < 0.15:
-        learned = learn_slip(learned, drive.bank, drive.step(learned), drive.estimator)
-    once = learn_slip(learned, drive.bank, drive.step(learned)._replace(verdict=GATED), drive.estimator)
+        learned = learn_slip(learned, drive.bank, drive.step(learned), SLIP_LOWEST, drive.estimator)
+    once = learn_slip(
+        learned, drive.bank, drive.step(learned)._replace(verdict=GATED), SLIP_LOWEST, drive.estimator
+    )
     assert (once.at_ns, once.scale) == (learned.at_ns, learned.scale)
     assert once.way_s == pytest.approx(learned.way_s + STEP_NS * 1e-9)
-    twice = learn_slip(once, drive.bank, drive.step(once)._replace(verdict=GATED), drive.estimator)
+    twice = learn_slip(
+        once, drive.bank, drive.step(once)._replace(verdict=GATED), SLIP_LOWEST, drive.estimator
+    )
     assert twice.at_ns == drive.t_ns
+
+
+def test_of_commands_only_what_is_worse_is_learned() -> None:
+    drive, learned = Drive(0.2), SLIP_AS_TOLD
+    for _ in range(300):
+        learned = learn_slip(learned, drive.bank, drive.step(learned), 1.0, drive.estimator)
+        assert learned.scale >= 1.0

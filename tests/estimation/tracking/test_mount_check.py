@@ -15,9 +15,9 @@ from estimation.tracking.mount_check import (
     NOTED_YAW,
     MountCheck,
     is_off,
+    mount_checked,
     mount_left,
     surely_above,
-    watched,
 )
 from formation.angles import wrapped
 from formation.kernel import entry
@@ -62,7 +62,7 @@ def drive(
 def checked(seen: list[tuple[int, Pose]], noise: PoseNoise = NOISE) -> MountCheck:
     check = NO_MOUNT_CHECK
     for at_ns, pose in seen:
-        check = watched(check, at_ns, pose, noise, False)
+        check = mount_checked(check, at_ns, pose, noise, False)
     return check
 
 
@@ -96,7 +96,7 @@ def test_a_right_mount_is_never_called_wrong(kind: str, noise: PoseNoise, rate: 
     for seed in range(8):
         check = NO_MOUNT_CHECK
         for at_ns, pose in drive(Mount(0.0, 0.0, 0.0), 20.0, seed, kind=kind, noise=noise, rate=rate):
-            check = watched(check, at_ns, pose, noise, False)
+            check = mount_checked(check, at_ns, pose, noise, False)
             left = mount_left(check)
             assert not surely_above(left.yaw, left.sd_yaw, NOTED_YAW)
             assert not surely_above(left.place, left.sd_place, NOTED_PLACE)
@@ -107,7 +107,7 @@ def test_noise_that_is_ten_times_what_was_told_makes_it_uncertain_and_not_wrong(
     for seed in range(10):
         check = NO_MOUNT_CHECK
         for at_ns, pose in drive(Mount(0.0, 0.0, 0.0), 20.0, seed, noise=loud):
-            check = watched(check, at_ns, pose, NOISE, False)
+            check = mount_checked(check, at_ns, pose, NOISE, False)
             assert not is_off(check)
 
 
@@ -121,7 +121,7 @@ def test_steps_of_the_motion_capture_are_not_taken_for_a_mount() -> None:
             if k % 240 == 180:
                 aside, turned = np.zeros(2), 0.0
             moved = Pose(pose.x + aside[0], pose.y + aside[1], wrapped(pose.theta + turned))
-            check = watched(check, at_ns, moved, NOISE, False)
+            check = mount_checked(check, at_ns, moved, NOISE, False)
             assert not is_off(check)
 
 
@@ -132,22 +132,24 @@ def test_a_body_that_is_knocked_aside_is_noticed_and_a_robot_that_stands_forgets
     assert not is_off(check)
     offset_ns, place = before[-1][0] + 10**9, after[0][1]
     for at_ns, pose in after:
-        check = watched(check, offset_ns + at_ns, pose, NOISE, False)
+        check = mount_checked(check, offset_ns + at_ns, pose, NOISE, False)
     assert is_off(check)
     still = check
     for k in range(1200):
-        still = watched(still, offset_ns + 41 * 10**9 + k * 8_333_333, place, NOISE, False)
+        still = mount_checked(still, offset_ns + 41 * 10**9 + k * 8_333_333, place, NOISE, False)
     assert mount_left(still) == mount_left(check)
 
 
 def test_an_arc_begins_anew_after_a_jump_and_after_a_gap() -> None:
-    begun = watched(NO_MOUNT_CHECK, 0, Pose(0.0, 0.0, 0.0), NOISE, False)
+    begun = mount_checked(NO_MOUNT_CHECK, 0, Pose(0.0, 0.0, 0.0), NOISE, False)
     far = Pose(0.0, 0.1, 0.0)
-    assert watched(begun, 300_000_000, far, NOISE, True) == begun._replace(since_ns=300_000_000, since=far)
-    assert watched(begun, 2_000_000_000, far, NOISE, False) == begun._replace(
+    assert mount_checked(begun, 300_000_000, far, NOISE, True) == begun._replace(
+        since_ns=300_000_000, since=far
+    )
+    assert mount_checked(begun, 2_000_000_000, far, NOISE, False) == begun._replace(
         since_ns=2_000_000_000, since=far
     )
-    assert watched(begun, 300_000_000, far, NOISE, False).arcs == 1.0
+    assert mount_checked(begun, 300_000_000, far, NOISE, False).arcs == 1.0
 
 
 def test_the_limit_is_one_of_the_heading_that_is_left() -> None:
@@ -161,7 +163,7 @@ def all_watched(rows: Rows[MountCheck], poses: Rows[Pose], count: int) -> bool:
     """Watch poses that are a hundredth of a second apart in compiled code."""
     check = load(MountCheck, rows, 0)
     for k in range(count):
-        check = watched(check, k * 10_000_000, load(Pose, poses, k), PoseNoise(3e-4, 3.5e-3), False)
+        check = mount_checked(check, k * 10_000_000, load(Pose, poses, k), PoseNoise(3e-4, 3.5e-3), False)
     store(rows, 0, check)
     return is_off(check)
 
@@ -175,6 +177,6 @@ def test_compiled_and_plain_agree_to_the_last_bit() -> None:
     off = all_watched(rows, poses, len(seen))
     check = NO_MOUNT_CHECK
     for k, pose in enumerate(seen):
-        check = watched(check, k * 10_000_000, pose, NOISE, False)
+        check = mount_checked(check, k * 10_000_000, pose, NOISE, False)
     assert off == is_off(check)
     same_bits(load(MountCheck, rows, 0), check)

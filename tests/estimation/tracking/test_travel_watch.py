@@ -12,7 +12,7 @@ from estimation.filters.gaussian import Gaussian
 from estimation.models.coordinated_turn import LeaderLimits
 from estimation.tracking.estimate import Estimate, guessed_when_slow
 from estimation.tracking.track_point import TrackPoint
-from estimation.tracking.travel_watch import NO_TRAVEL, TravelWatch, travelled, watched
+from estimation.tracking.travel_watch import NO_TRAVEL, TravelWatch, direction_watched, travel_watched
 from formation.kernel import entry, interpreted
 from formation.pose import Motion
 from formation.records import Rows, copy_of, load, row_of, rows_of, size, store
@@ -29,7 +29,9 @@ def gone(
     """Watch over velocities [m/s] that are told a frame apart, settled where they are not slow."""
     for number, (vx, vy) in enumerate(velocities, start=1):
         belief = Gaussian.of(np.array([0.0, 0.0, vx, vy, 0.0]), np.eye(5))
-        watch = travelled(watch, belief, watch.at_ns + number * frame_ns, math.hypot(vx, vy) >= 0.04, LIMITS)
+        watch = direction_watched(
+            watch, belief, watch.at_ns + number * frame_ns, math.hypot(vx, vy) >= 0.04, LIMITS
+        )
     return watch
 
 
@@ -65,7 +67,7 @@ def test_where_it_may_have_turned_unseen_nothing_is_said() -> None:
 
 def test_nothing_is_said_of_a_direction_that_was_never_sure() -> None:
     belief = Gaussian.of(np.array([0.0, 0.0, 0.08, 0.0, 0.0]), np.eye(5))
-    unsure = travelled(NO_TRAVEL, belief, FRAME_NS, False, LIMITS)
+    unsure = direction_watched(NO_TRAVEL, belief, FRAME_NS, False, LIMITS)
     assert unsure == NO_TRAVEL
     assert gone([(0.0, 0.0), (-0.08, 0.0)], unsure).turned_ns == 0
 
@@ -74,7 +76,7 @@ def test_nothing_is_said_of_a_direction_that_was_never_sure() -> None:
 def followed(watches: Rows[TravelWatch], points: Rows[TrackPoint], limits: Rows[LeaderLimits]) -> None:
     watch, given = load(TravelWatch, watches, 0), load(LeaderLimits, limits, 0)
     for k in range(size(points)):
-        watch = watched(watch, load(TrackPoint, points, k), 1.0, given)
+        watch = travel_watched(watch, load(TrackPoint, points, k), 1.0, given)
         store(watches, k, watch)
 
 
