@@ -162,6 +162,17 @@ def _middle_within(model: ErrorModel, inside: InvariantSet, boxes: Boxes) -> Boo
 
 def _shown(units: Units, metric: Metric, boxes: Boxes) -> tuple[BoolArray, BoolArray]:
     """Which boxes pass, and which have a middle that does not, whatever was rounded; shape (n,)."""
+    shown, refuted = np.ones(len(boxes), dtype=np.bool_), np.zeros(len(boxes), dtype=np.bool_)
+    for (m11, m12, m22), anywhere in enclosed(units, metric, boxes):
+        shown &= _positive(*anywhere)
+        refuted |= (m11.hi < 0.0) | (m22.hi < 0.0) | ((m11 * m22 - m12 * m12).hi < 0.0)
+    return shown, refuted
+
+
+def enclosed(
+    units: Units, metric: Metric, boxes: Boxes
+) -> list[tuple[tuple[Interval, ...], tuple[Interval, ...]]]:
+    """For each of :func:`matrices` its entries at the middles of boxes, and anywhere in them."""
     zero, one = exactly(0.0), exactly(1.0)
     middle_y = exactly(0.5 * (boxes.y_lo + boxes.y_hi))
     middle_theta = exactly(0.5 * (boxes.theta_lo + boxes.theta_hi))
@@ -169,13 +180,11 @@ def _shown(units: Units, metric: Metric, boxes: Boxes) -> tuple[BoolArray, BoolA
     at_middle = matrices(units, metric, middle_y, middle_theta, lambda value: value)
     over_box = matrices(units, metric, Slope(y, one, zero), Slope(theta, zero, one), constant)
     to_y, to_theta = y - middle_y, theta - middle_theta
-    shown, refuted = np.ones(len(boxes), dtype=np.bool_), np.zeros(len(boxes), dtype=np.bool_)
+    found: list[tuple[tuple[Interval, ...], tuple[Interval, ...]]] = []
     for matrix, slopes in zip(at_middle, over_box, strict=True):
         pairs = zip(matrix, slopes, strict=True)
-        shown &= _positive(*(here + slope.d1 * to_y + slope.d2 * to_theta for here, slope in pairs))
-        m11, m12, m22 = matrix
-        refuted |= (m11.hi < 0.0) | (m22.hi < 0.0) | ((m11 * m22 - m12 * m12).hi < 0.0)
-    return shown, refuted
+        found.append((matrix, tuple(here + slope.d1 * to_y + slope.d2 * to_theta for here, slope in pairs)))
+    return found
 
 
 def _positive(m11: Interval, m12: Interval, m22: Interval) -> BoolArray:

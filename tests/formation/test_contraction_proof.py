@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from formation.contraction_metric import Metric, PathUnits, find_metric
-from formation.contraction_proof import Boxes, Units, clipped, cover, keeps, matrices, shrinks
+from formation.contraction_proof import Boxes, Units, clipped, cover, enclosed, keeps, matrices, shrinks
 from formation.error_set import error_set
 from formation.error_set_kernels import ErrorModel
 from formation.intervals import exactly
@@ -132,6 +132,22 @@ def test_the_matrices_are_those_of_the_text(inside: InvariantSet, metric: Metric
                 assert entry.hi[n] - entry.lo[n] < 1e-10
         for entry, value in zip(thin[0], metric_at(at)[[0, 0, 1], [0, 1, 1]], strict=True):
             assert entry.lo[n] - 1e-10 <= value <= entry.hi[n] + 1e-10
+
+
+@pytest.mark.parametrize(("wide_y", "wide_theta"), [(1e-4, 0.02), (0.02, 1e-4), (0.01, 0.01)])
+def test_all_values_in_a_box_lie_within_what_encloses_them(
+    inside: InvariantSet, metric: Metric, wide_y: float, wide_theta: float
+) -> None:
+    rho, theta = places(inside, 200, 6)
+    y, units, random = 0.2 / rho, Units.of(MODEL), np.random.default_rng(7)
+    boxes = Boxes(y - wide_y, y + wide_y, theta - wide_theta, theta + wide_theta)
+    for _ in range(20):
+        share = np.clip(random.uniform(-1.5, 1.5, (2, len(y))), -1.0, 1.0)
+        at = exactly(y + share[0] * wide_y), exactly(theta + share[1] * wide_theta)
+        thin = matrices(units, metric, *at, lambda value: value)
+        for (_, anywhere), matrix in zip(enclosed(units, metric, boxes), thin, strict=True):
+            for wide, value in zip(anywhere, matrix, strict=True):
+                assert np.all((wide.lo <= value.hi) & (value.lo <= wide.hi))
 
 
 def has(boxes: Boxes, y: float, theta: float) -> bool:
