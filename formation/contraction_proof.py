@@ -32,7 +32,7 @@ Value = TypeVar("Value", Interval, Slope)
 Coefficients = list[list[Interval]]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Units:
     """The system in units of rho_0, each constant within an interval."""
 
