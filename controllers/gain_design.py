@@ -187,7 +187,7 @@ def _lowest(task: Task) -> tuple[float, float, str] | None:
                 within = (
                     f"distance within {100.0 * task.band:g} % of rho_0 whatever |u1| <= {task.k_u:g} does"
                 )
-                return mu1, mu_rho, f"{within}, and k_u* proved above {STEERING_RESERVE:g} k_u"
+                return mu1, mu_rho, f"{within}, and k_u* above {STEERING_RESERVE:g} k_u by a constant metric"
     return None
 
 
