@@ -169,7 +169,8 @@ def inject(
     for k, moment in enumerate(drive(node.scenario, generator, math.ceil(until / PERIOD))):
         t, capture_ns = k * PERIOD, (k + 120) * PERIOD_NS
         for sample in moment.heard:
-            store(memory.desk.sample, 0, OdometrySample(*sample, False, Pose(0.0, 0.0, 0.0)))
+            heard = OdometrySample(sample.stamp_ns, sample.v2, sample.u2, False, Pose(0.0, 0.0, 0.0))
+            store(memory.desk.sample, 0, heard)
             memory.take_odometry()
         faults = fault_rows([] if fault is None else [fault])
         frame = faulty(faults, t, PERIOD, moment.shown, last or moment.shown)

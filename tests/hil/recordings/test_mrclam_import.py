@@ -198,6 +198,6 @@ def test_a_real_leader_is_followed_and_commands_are_seen_to_run_ahead(tmp_path: 
     assert estimation["rmse"]["v1"] <= 0.014
     assert estimation["coverage_3sigma"]["v1"] >= 0.95
     own = judge_own_motion(log, scenario)
-    assert 0.15 < own["delay_s"] < 0.35
+    assert 0.15 < own["delay_s"] + own["time_constant_s"] < 0.35
     assert 0.8 < own["scale_v"] < 1.0
     assert 0.75 < own["scale_u"] < 1.0
