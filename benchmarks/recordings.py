@@ -75,19 +75,21 @@ def figures_of(log: Path, overrides: Sequence[str] = (), *, answered: bool = Fal
     known = np.isfinite(true) if len(true) else np.zeros(0, dtype=np.bool_)
     if np.count_nonzero(known) < 10:
         return [np.nan] * 5 + [tracked] + [np.nan] * 4
+    # The truth has no alpha1 where a leader stands.
     v1, alpha1 = errors["v1"][known], errors["alpha1"][known]
     sd_v1, sd_alpha1 = (samples.sd[known, QUANTITIES.index(name)] for name in ("v1", "alpha1"))
+    known_alpha1 = np.isfinite(alpha1)
     rmse, everywhere = float(np.sqrt(np.mean(v1**2))), columns.truth.v1[np.isfinite(columns.truth.v1)]
     return [
         rmse,
         rmse / float(np.std(true[known])),
         rmse / float(np.std(everywhere)),
-        float(np.median(np.abs(alpha1))),
+        float(np.nanmedian(np.abs(alpha1))),
         float(np.corrcoef(np.asarray(samples.seen.v1)[known], true[known])[0, 1]),
         tracked,
-        float(np.mean(np.abs(alpha1) > 5.0 * sd_alpha1)),
+        float(np.mean(np.abs(alpha1[known_alpha1]) > 5.0 * sd_alpha1[known_alpha1])),
         float(np.mean((v1 / sd_v1) ** 2)),
-        float(np.mean((alpha1 / sd_alpha1) ** 2)),
+        float(np.nanmean((alpha1 / sd_alpha1) ** 2)),
         float(np.nanmean(samples.nis[known])),
     ]
 

@@ -23,7 +23,7 @@ def pose_scatter(
 ) -> float | None:
     """Standard deviation of the noise of each of the columns ``values`` (n, k) of a track; None if unknown.
 
-    Headings must be unwrapped. Third differences tell it of neighbouring frames, and of frames 50 ms apart
+    Headings must be unwrapped. Third differences tell it of neighbouring frames, and of frames 100 ms apart
     for the part that neighbours share; the larger counts. Only where the body moves by its ``places`` (n, 2)
     [m] faster than ``least_speed`` [m/s]: who stands is quieter.
     """

@@ -5,9 +5,10 @@ whose acceleration changes evenly, whatever the spacing of the frames. What a ro
 its jerk times the cube of the spacing over 4.5: micrometres at 100 frames a second, and tenths of a
 millimetre at ten. So they tell noise from manoeuvres without knowing any model of either.
 
-Noise that one frame shares with the next, as filtered or shaking markers have it, is missing in them.
-Therefore the same differences are taken over strides of some 50 ms as well. Over these a speed step is as
-large as noise is, so that they can keep the scale from falling below one, and no more.
+Noise that one frame shares with the next is missing in them: that of filtered poses, and of bodies that rock
+as they drive, some five times a second. Therefore the same differences are taken over strides of some 100 ms
+as well, half of such a swing. Over these a speed step is as large as noise is, so that they can keep the
+scale from falling below one, and no more.
 
 Noise is that of bodies that move; who stands is quieter, and isn't asked.
 
@@ -31,9 +32,9 @@ REFUTED = 1.3
 """Scale above which what was told is refuted."""
 
 _NS = 1e-9
-STRIDE_NS = 47_000_000  # no multiple of a usual spacing of frames, so that a microsecond doesn't matter
+STRIDE_NS = 97_000_000  # no multiple of a usual spacing of frames, so that a microsecond doesn't matter
 LONGEST_NS = 520_000_000  # four positions further apart tell more of the motion than of the noise
-_ANOTHER = 1.2  # factor between two scales from which on they don't agree
+_ANOTHER = 2.0  # factor between two scales that don't agree; real bodies rock now more, now less
 _FOLLOWED = 3.0  # [s] in which what rests on a scale follows one that becomes known more exactly
 _LEAST_LEFT = 0.05  # of an innovation after the update; what leaves less tells nothing of the noise
 _HALF_TRACK = 0.1  # by which a turn rate is the speed of a wheel [m]
@@ -94,7 +95,7 @@ class NoiseEstimate(NamedTuple):
     """All that is known of the noise.
 
     scale: what measurements are taken with now. frames, strides: neighbouring frames, and frames some
-    50 ms apart. gated: whether the newest frame or sighting wasn't believed. basis: scale of positions that
+    100 ms apart. gated: whether the newest frame or sighting wasn't believed. basis: scale of positions that
     what is learned of the leader's driving rests on.
     """
 
