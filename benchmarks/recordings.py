@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
@@ -82,8 +83,8 @@ def figures_of(log: Path, overrides: Sequence[str] = (), *, answered: bool = Fal
     rmse, everywhere = float(np.sqrt(np.mean(v1**2))), columns.truth.v1[np.isfinite(columns.truth.v1)]
     return [
         rmse,
-        rmse / float(np.std(true[known])),
-        rmse / float(np.std(everywhere)),
+        _over(rmse, true[known]),
+        _over(rmse, everywhere),
         float(np.nanmedian(np.abs(alpha1))),
         float(np.corrcoef(np.asarray(samples.seen.v1)[known], true[known])[0, 1]),
         tracked,
@@ -92,6 +93,12 @@ def figures_of(log: Path, overrides: Sequence[str] = (), *, answered: bool = Fal
         float(np.nanmean((alpha1 / sd_alpha1) ** 2)),
         float(np.nanmean(samples.nis[known])),
     ]
+
+
+def _over(rmse: float, speeds: NDArray[np.float64]) -> float:
+    """An error over that of the best constant guess, where speeds differ."""
+    guess = float(np.std(speeds))
+    return rmse / guess if guess > 1e-6 else np.nan
 
 
 def _moving(estimates: EstimateColumns, columns: Columns, v_eps: float) -> int:
