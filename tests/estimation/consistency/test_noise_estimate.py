@@ -234,8 +234,8 @@ def test_when_frames_before_are_forgotten_what_they_told_is_not() -> None:
 
 
 @pytest.mark.parametrize(
-    ("scale", "another"), [(0.8, True), (0.9, False), (1.0, False), (1.15, False), (1.25, True)]
+    ("scale", "another"), [(0.48, True), (0.55, False), (1.0, False), (1.8, False), (2.1, True)]
 )
-def test_noise_is_another_one_from_a_fifth_on(scale: float, another: bool) -> None:
+def test_noise_is_another_one_from_twice_on(scale: float, another: bool) -> None:
     found = NOISE_AS_TOLD._replace(scale=NOISE_AS_TOLD.scale._replace(position=2.0 * scale), basis=2.0)
     assert is_another(found) == another
