@@ -138,7 +138,7 @@ def test_a_sensor_on_the_follower_makes_a_log_of_sightings(tmp_path: Path) -> No
             out.write("burger/leader_sighting", typename_of(seen), encode(seen), at_ns, at_ns)
     link = guessed_link(read_log(path), "waffle", None)
     assert (link.leader, link.follower, link.scenario.estimator.front_end) == ("waffle", "burger", "body")
-    # Odometry that may slip by a tenth leaves v1 to 0.01 m/s, and none of the leader's speeds is above k_v = 0.1.
+    # Odometry that may slip by a tenth leaves v1 to 0.01 m/s, and no leader is faster than k_v = 0.1.
     assert replay_fed(read_log(path), link, "why").estimates[-1].v1 == pytest.approx(0.1, abs=1e-2)
 
 
