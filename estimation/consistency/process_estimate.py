@@ -27,6 +27,7 @@ from estimation.consistency.filter_bank import (
     Trial,
     score_all,
 )
+from estimation.consistency.summed_way import mean_of_way, way_added
 from estimation.filters.filter import Filter
 from estimation.filters.gaussian import Gaussian
 from estimation.models.coordinated_turn import FollowerMotion, ProcessNoise, Spread, mean_motion
@@ -126,24 +127,16 @@ def _with_way(learned: LearnedProcess, point: TrackPoint) -> LearnedProcess:
     """The same with the follower's way to a point added; in the world frame that makes no difference."""
     if point.measurement.in_world:
         return learned
-    was, way, dt = learned.way, point.way, point.way_s
-    added = FollowerMotion(
-        was.v2 + way.v2 * dt,
-        was.u2 + way.u2 * dt,
-        was.sd_v2 + way.sd_v2 * way.sd_v2 * dt,
-        was.sd_u2 + way.sd_u2 * way.sd_u2 * dt,
-    )
-    return learned._replace(way_s=learned.way_s + dt, way=added)
+    added = way_added(learned.way, point.way, point.way_s)
+    return learned._replace(way_s=learned.way_s + point.way_s, way=added)
 
 
 @kernel
 def _way_of(learned: LearnedProcess, measurement: Measurement, dt: float) -> FollowerMotion:
     """Mean motion since the members' time: by the whole way where that is known, else by its ends."""
-    way, span = learned.way, learned.way_s
-    if measurement.in_world or abs(span - dt) > _SAME:
+    if measurement.in_world or abs(learned.way_s - dt) > _SAME:
         return mean_motion(learned.motion, measurement.motion)
-    by = 1.0 / span
-    return FollowerMotion(way.v2 * by, way.u2 * by, math.sqrt(way.sd_v2 * by), math.sqrt(way.sd_u2 * by))
+    return mean_of_way(learned.way, learned.way_s)
 
 
 @kernel

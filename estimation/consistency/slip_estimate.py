@@ -16,6 +16,7 @@ import math
 from typing import NamedTuple
 
 from estimation.consistency.filter_bank import LANES, Member
+from estimation.consistency.summed_way import mean_of_way, way_added
 from estimation.filters.ekf import informed
 from estimation.filters.filter import EKF, Filter
 from estimation.filters.gaussian import Gaussian, nis_of
@@ -90,14 +91,8 @@ def learn_slip(
             store(bank, k, load(Member, bank, k)._replace(belief=point.belief))
         nowhere = FollowerMotion(0.0, 0.0, 0.0, 0.0)
         return learned._replace(begun=True, at_ns=now_ns, way_s=0.0, way=nowhere)
-    was, way, dt = learned.way, point.way, point.way_s
-    added = FollowerMotion(
-        was.v2 + way.v2 * dt,
-        was.u2 + way.u2 * dt,
-        was.sd_v2 + way.sd_v2 * way.sd_v2 * dt,
-        was.sd_u2 + way.sd_u2 * way.sd_u2 * dt,
-    )
-    learned = learned._replace(way_s=learned.way_s + dt, way=added)
+    added = way_added(learned.way, point.way, point.way_s)
+    learned = learned._replace(way_s=learned.way_s + point.way_s, way=added)
     if now_ns - learned.at_ns < _INTERVAL_NS or outlier:
         return learned
     if abs(learned.way_s - (now_ns - learned.at_ns) * _NS) > _SAME:
@@ -110,10 +105,10 @@ def learn_slip(
 @kernel
 def _scored(learned: LearnedSlip, bank: Rows[Member], point: TrackPoint, estimator: Filter) -> LearnedSlip:
     """Score every member by a measurement, and take the mean of those that are likely then."""
-    dt, way = learned.way_s, learned.way
-    by, kept, off = 1.0 / dt, math.exp(-dt / FORGOTTEN), SLIP_LOWEST / learned.scale
+    dt = learned.way_s
+    kept, off = math.exp(-dt / FORGOTTEN), SLIP_LOWEST / learned.scale
     # The sums are of deviations as they were taken, which had a scale already.
-    mean = FollowerMotion(way.v2 * by, way.u2 * by, math.sqrt(way.sd_v2 * by), math.sqrt(way.sd_u2 * by))
+    mean = mean_of_way(learned.way, dt)
     highest = -math.inf
     one = estimator._replace(kind=EKF, noise=point.noise)
     for k in range(LANES, BANK):
