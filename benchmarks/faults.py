@@ -46,9 +46,10 @@ from hil.emulator.faults import Pair, fault_rows, faulty
 from hil.nodes.estimator import EstimatorNode
 from hil.nodes.estimator_desk import TimedFrame
 from hil.nodes.estimator_records import Known
+from hil.scenario.emulated import FaultSection
 from hil.scenario.files import load_scenario
 from hil.scenario.parts import gains, leader_program
-from hil.scenario.schema import FaultSection, Scenario
+from hil.scenario.schema import Scenario
 from hil.wire.assumed_errors import bounds_of
 
 PERIOD_NS = 8_333_333

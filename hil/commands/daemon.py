@@ -60,7 +60,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
             from hil.live.daemon import Ending, run_daemon
             from hil.wire.messages import prepare
             from hil.wire.session import Endpoints
-            from hil.wire.topics import types_of, urgent_topics
+            from hil.wire.topics import types_of
 
         ending = Ending()
         ending.on_signals()
@@ -83,7 +83,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         prepare(types_of(chosen).values())
         dropped = run_daemon(
             collector_paused()(lambda: _WORKERS[name](order)),
-            urgent_topics(chosen),
+            chosen,
             endpoints,
             ending,
             duration,

@@ -10,7 +10,7 @@ from formation.angles import wrapped
 from formation.kernel import kernel
 from formation.pose import Pose
 from formation.records import Rows, load, rows_of, size, store
-from hil.scenario.schema import FaultSection
+from hil.scenario.emulated import FaultSection
 
 
 class FaultKind(IntEnum):

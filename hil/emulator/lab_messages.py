@@ -10,6 +10,7 @@ from formation.pose import Motion, Pose
 from hil.emulator.mocap import SeenPose, seen_pose
 from hil.wire import message_types as msg
 from hil.wire.messages import header
+from hil.wire.topics import within
 
 _NO_COVARIANCE = np.zeros(36)
 MOCAP_FRAME = "mocap"
@@ -25,8 +26,8 @@ def frame_message(capture_ns: int, number: int, bodies: Iterable[tuple[str, Pose
 
 
 def odometry_frames(robot: str) -> tuple[str, str]:
-    """Frames of a robot's odometry: that it counts in, and its own."""
-    return f"{robot}/odom", f"{robot}/base_footprint"
+    """Frames of the odometry of a robot in a namespace: that it counts in, and its own."""
+    return within(robot, "odom"), within(robot, "base_footprint")
 
 
 def odometry_message(stamp_ns: int, robot: str, pose: Pose, motion: Motion) -> msg.Odometry:

@@ -20,12 +20,15 @@ _FRAME, _ODOMETRY, _TRUTH = (typename_of(kind) for kind in (msg.RigidBodies, msg
 
 
 class LabWriter:
-    """Writes for robots of these names, the leader first, and the pairs that they make."""
+    """Writes for robots with these bodies, the leader first, and the pairs that they make."""
 
-    def __init__(self, names: tuple[str, ...], pairs: list[Topics]) -> None:
-        self._names = names
-        self._frame = frame_template(MOCAP_FRAME, names)
-        self._odometry = [odometry_template(*odometry_frames(name)) for name in names]
+    def __init__(self, bodies: tuple[str, ...], pairs: list[Topics]) -> None:
+        self._count = len(bodies)
+        self._frame = frame_template(MOCAP_FRAME, bodies)
+        spaces = (pairs[0].leader, *(pair.follower for pair in pairs))
+        topics_of_all = (pairs[0].leader_odom, *(pair.odom for pair in pairs))
+        templates = (odometry_template(*odometry_frames(space)) for space in spaces)
+        self._odometry = tuple(zip(topics_of_all, templates, strict=True))
         self._truths = [pair.truth for pair in pairs]
         self._truth = truth_template(MOCAP_FRAME)
         self._drives_topic = pairs[0].leader_cmd_vel
@@ -34,18 +37,18 @@ class LabWriter:
     def frame(self, plant: Plant, slot: int, stamp_ns: int, number: int, at_ns: int) -> Outgoing:
         """The frame in a slot, captured ``at_ns`` by a clock that says ``stamp_ns``."""
         buffer, places_at = self._frame
-        tell_frame(buffer, places_at, stamp_ns, number, plant.memory.seen, slot * len(self._names))
+        tell_frame(buffer, places_at, stamp_ns, number, plant.memory.seen, slot * self._count)
         return Outgoing(topics.RIGID_BODIES, _FRAME, buffer.tobytes(), at_ns)
 
     def odometry(self, plant: Plant, slot: int, stamp_ns: int) -> Iterator[Outgoing]:
         """The odometry in a slot that arrives by this time, of each robot that has any."""
-        first = slot * len(self._names)
+        first = slot * self._count
         arrive_ns = columns_of(plant.memory.odometry)["arrives_ns"]
-        for k, (name, (buffer, numbers_at)) in enumerate(zip(self._names, self._odometry, strict=True)):
+        for k, (topic, (buffer, numbers_at)) in enumerate(self._odometry):
             if arrive_ns[first + k] != stamp_ns:
                 continue
             tell_odometry(buffer, numbers_at, stamp_ns, plant.memory.odometry, first + k)
-            yield Outgoing(f"{name}/odom", _ODOMETRY, buffer.tobytes(), stamp_ns)
+            yield Outgoing(topic, _ODOMETRY, buffer.tobytes(), stamp_ns)
 
     def truths(self, plant: Plant, at_ns: int, number: int) -> Iterator[Outgoing]:
         """True states of each pair at the capture of a frame."""

@@ -75,9 +75,9 @@ class EmulatorNode:
         self.needs = frozenset(name for need in needs for name in node_names(need, links))
         self.pairs = [link_topics(link) for link in links]
         self.topics = self.pairs[0]
-        self.names = (self.topics.leader, *(pair.follower for pair in self.pairs))
-        self.writer = LabWriter(self.names, self.pairs)
-        self.poses = chain_poses(scenario, len(self.names))
+        bodies = (links[0].bodies[0], *(link.bodies[1] for link in links))
+        self.writer = LabWriter(bodies, self.pairs)
+        self.poses = chain_poses(scenario, len(bodies))
         self.orders = ordered_sides(scenario)
         self._handlers: dict[str, Callable[[EmulatorState, bytes, int], None]] = {
             **{pair.cmd_vel: partial(self._on_command, k) for k, pair in enumerate(self.pairs, start=1)},

@@ -11,7 +11,7 @@ from formation.angles import wrapped
 from formation.kernel import kernel
 from formation.pose import Motion, Pose, advance
 from formation.records import Rows, load, rows_of, size, store
-from hil.scenario.schema import OdometryFaultSection
+from hil.scenario.emulated import OdometryFaultSection
 
 _MOST_SLIP = 0.9
 _SMALL = 1e-6

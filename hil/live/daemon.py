@@ -13,9 +13,12 @@ from types import FrameType
 from typing import Any, Protocol
 
 from hil.nodes.node import Outgoing
+from hil.scenario.schema import Scenario
 from hil.wire.events import TICK, Event
+from hil.wire.key_layout import layout_of
 from hil.wire.pubsub import Inbox, Wire
 from hil.wire.session import Endpoints, close_session, open_session
+from hil.wire.topics import urgent_topics
 
 _LONGEST_WAIT = 0.1
 _LINGER = 0.05
@@ -90,7 +93,7 @@ class Ending:
 
 def run_daemon(
     make_worker: Callable[[], Worker],
-    urgent: Iterable[str],
+    scenario: Scenario,
     endpoints: Endpoints,
     ending: Ending,
     duration_s: float | None = None,
@@ -99,11 +102,11 @@ def run_daemon(
     """Run a worker on the wire until the end is asked for or ``duration_s`` is over.
 
     The worker is made once the wire is there; ``on_ready`` is called when it is subscribed. Events are taken
-    one at a time in order of arrival; ``now`` is the host clock when one is taken. ``urgent``: topics that
-    go ahead of all others. Returns how many arrivals found the inbox full and were dropped.
+    one at a time in order of arrival; ``now`` is the host clock when one is taken. Topics lie where the
+    scenario has them. Returns how many arrivals found the inbox full and were dropped.
     """
     session = open_session(endpoints, give_up=lambda: ending.asked)
-    wire = Wire(session, urgent)
+    wire = Wire(session, urgent_topics(scenario), layout_of(scenario))
     try:
         ending.notify(wire.wake)
         worker = make_worker()

@@ -23,6 +23,7 @@ from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.drive_message import drive_message
+from hil.wire.key_layout import layout_of
 from hil.wire.messages import encode
 from hil.wire.pubsub import Wire
 from hil.wire.session import Endpoints, close_session, open_session
@@ -103,8 +104,8 @@ class _Supervisor:
         self._pairs = [link_topics(link) for link in links]
         self._nodes = [name for daemon in daemons for name in node_names(daemon, links)]
         self._session = open_session(Endpoints(connect=endpoint))
-        self._wire = Wire(self._session, urgent_topics(scenario))
-        self._monitor = RunMonitor(self._session, self._pairs)
+        self._wire = Wire(self._session, urgent_topics(scenario), layout_of(scenario))
+        self._monitor = RunMonitor(self._session, self._pairs, layout_of(scenario))
         self._children = Children(log_path.parent)
         extra = {
             "recorder": ["--out", str(log_path)],

@@ -14,6 +14,7 @@ from estimation.tracking.tracker import Status
 from hil.nodes.findings import Findings, findings_in
 from hil.wire import message_types as msg
 from hil.wire import topics
+from hil.wire.key_layout import OURS, KeyLayout
 from hil.wire.messages import MalformedPayloadError, decode_as, to_ns
 from hil.wire.topics import Topics
 
@@ -92,12 +93,12 @@ class RunMonitor:
     Zenoh keeps the newest payload of a topic for us: Python is not called for each one of a long chain's.
     """
 
-    def __init__(self, session: zenoh.Session, pairs: Sequence[Topics]) -> None:
+    def __init__(self, session: zenoh.Session, pairs: Sequence[Topics], layout: KeyLayout = OURS) -> None:
         self.snapshot = Snapshot(tuple(pair.follower for pair in pairs))
         self._updated_at = time.monotonic()
-        self._diagnostics = session.declare_subscriber(topics.DIAGNOSTICS, self._on_diagnostics)
+        self._diagnostics = session.declare_subscriber(layout.key(topics.DIAGNOSTICS), self._on_diagnostics)
         self._newest = {
-            topic: session.declare_subscriber(topic, zenoh.handlers.RingChannel(1))
+            topic: session.declare_subscriber(layout.key(topic), zenoh.handlers.RingChannel(1))
             for pair in pairs
             for topic in (pair.estimate, pair.certified, pair.command, pair.truth)
         }

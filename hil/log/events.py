@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from hil.errors import UsageError
 from hil.log.reader import Log
+from hil.scenario.links import bodies_of
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -81,7 +82,7 @@ def check_inputs(log: Log, scenario: Scenario) -> None:
     """
     names = topics_of(scenario)
     if topics.RIGID_BODIES in log.topics:
-        _check_bodies(log, {"leader": names.leader, "follower": names.follower})
+        _check_bodies(log, dict(zip(("leader", "follower"), bodies_of(scenario), strict=True)))
     elif names.sighting not in log.topics:
         wanted = f"{topics.RIGID_BODIES!r} or {names.sighting!r}"
         raise UsageError(

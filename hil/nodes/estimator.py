@@ -38,6 +38,7 @@ from hil.nodes.process_report import process_report
 from hil.nodes.sensor_offsets import offsets_report
 from hil.scenario.files import refuse_unrunnable
 from hil.scenario.leader_model import leader_mount
+from hil.scenario.links import bodies_of
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.certified_message import certified_message
@@ -107,7 +108,7 @@ class EstimatorState:
 class EstimatorNode:
     """Step of the estimator of one follower. Raises :class:`UsageError` for one that is not live.
 
-    ``others``: names of further robots that the motion capture shows.
+    ``others``: further bodies that the motion capture shows.
     """
 
     def __init__(self, scenario: Scenario, name: str = NAME, others: frozenset[str] = frozenset()) -> None:
@@ -116,11 +117,11 @@ class EstimatorNode:
         self.name = name
         self.scenario = scenario
         self.topics = topics_of(scenario)
-        leader, follower = self.topics.leader, self.topics.follower
+        leader, follower = bodies_of(scenario)
         self._reader = frame_reader(others | {leader, follower})
         self._wanted, self._leader_at = self._reader.pair(leader, follower), self._reader.names.index(leader)
         self._leader_mount = leader_mount(scenario)
-        self._template = estimate_template(follower, MOST_RECEIPTS)
+        self._template = estimate_template(self.topics.follower, MOST_RECEIPTS)
         self.rules = node_rules(scenario, self._template.numbers_at)
         self.aligns = given.align_odometry and given.own_motion != "mocap"
         self.certifying = certifying(scenario)

@@ -20,7 +20,7 @@ def estimator_node(link: Link) -> EstimatorNode:
     # Brings compiled code along: a second of imports that a controller has no use for.
     from hil.nodes.estimator import EstimatorNode
 
-    return EstimatorNode(link.scenario, link.node_name("estimator"), link.others)
+    return EstimatorNode(link.scenario, link.node_name("estimator"), link.other_bodies)
 
 
 def controller_node(link: Link) -> ControllerNode:

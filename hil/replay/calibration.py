@@ -16,13 +16,15 @@ from hil.log.events import logged_events
 from hil.log.metadata import IMPORT, mode_of
 from hil.log.reader import Log
 from hil.scenario.leader_model import follower_mount
+from hil.scenario.links import bodies_of
 from hil.scenario.schema import Scenario
 from hil.wire import topics
+from hil.wire.events import Event
 from hil.wire.message_types import Truth
 from hil.wire.messages import MalformedPayloadError, decode_as, to_ns
 from hil.wire.reading import RefusedError, read_frame, read_sighting
 from hil.wire.records import Sighting
-from hil.wire.topics import Topics, topics_of
+from hil.wire.topics import topics_of
 
 Poses = dict[int, tuple[float, float, float, float, float]]
 """Leader's x, y [m] and follower's x, y [m], theta [rad] by capture time [ns]."""
@@ -50,19 +52,19 @@ def calibrate(
     sightings: dict[int, Sighting] = {}
     poses: Poses = {}
     late_ns = round(scenario.estimator.stamp_offset_s * 1e9)
-    mount = follower_mount(scenario)
+    mount, bodies = follower_mount(scenario), bodies_of(scenario)
     for event, now_ns in logged_events(log, [source, names.sighting]):
         try:
             if event.topic == names.sighting:
                 sighting = read_sighting(event.payload, now_ns)
                 sightings[sighting.capture_ns] = sighting
             else:
-                poses |= _poses(event.topic, event.payload, names, now_ns, late_ns, mount)
+                poses |= _poses(event, now_ns, bodies, late_ns, mount)
         except (RefusedError, MalformedPayloadError):
             continue
     if len(poses) < 2:
         raise UsageError(
-            f"log {log.path}: has no poses of {names.leader!r} and {names.follower!r} beside its sightings; "
+            f"log {log.path}: has no poses of {bodies[0]!r} and {bodies[1]!r} beside its sightings; "
             f"expected mocap frames on {topics.RIGID_BODIES!r}, or poses in the [truth] of the import's map"
         )
     zero_ns = 0 if mode_of(log) == IMPORT else min(sightings, default=0)
@@ -81,12 +83,12 @@ def calibrate(
         raise UsageError(f"log {log.path}: {error}; give a longer span") from None
 
 
-def _poses(topic: str, payload: bytes, names: Topics, now_ns: int, late_ns: int, mount: Mount) -> Poses:
-    if topic == topics.RIGID_BODIES:
-        frame = read_frame(payload, names.leader, names.follower, now_ns)
+def _poses(event: Event, now_ns: int, bodies: tuple[str, str], late_ns: int, mount: Mount) -> Poses:
+    if event.topic == topics.RIGID_BODIES:
+        frame = read_frame(event.payload, *bodies, now_ns)
         own = robot_pose(frame.follower, mount)
         return {frame.capture_ns - late_ns: (*frame.leader, own.x, own.y, own.theta)}
-    truth = decode_as(payload, Truth)
+    truth = decode_as(event.payload, Truth)
     positions = (truth.leader_x, truth.leader_y, truth.follower_x, truth.follower_y, truth.follower_theta)
     return {to_ns(truth.header.stamp): positions} if all(map(math.isfinite, positions)) else {}
 

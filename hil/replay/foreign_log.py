@@ -11,10 +11,12 @@ import numpy as np
 from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__PointStamped as PointStamped
 from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__PoseStamped as PoseStamped
 
+from hil.emulator.lab_messages import odometry_frames
 from hil.errors import UsageError
 from hil.log.events import Timed
 from hil.log.reader import Log, Record
 from hil.replay.topic_map import TopicMap, needs_odometry
+from hil.scenario.links import bodies_of
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.events import Event
@@ -73,8 +75,8 @@ def foreign_events(log: Log, chart: TopicMap) -> list[Timed]:
 def _frames(log: Log, chart: TopicMap) -> list[_Input]:
     """Mocap frames with the pair's bodies under the scenario's names."""
     topic = _present(log, chart, chart.topics.rigid_bodies or "", _FRAMES)
-    own = topics_of(chart.scenario)
-    names = {chart.leader: own.leader, chart.follower: own.follower}
+    leader, follower = bodies_of(chart.scenario)
+    names = {chart.leader: leader, chart.follower: follower}
     frames: list[_Input] = []
     seen: set[str] = set()
     for record in log.records([topic]):
@@ -129,10 +131,9 @@ def _paired_frames(log: Log, chart: TopicMap) -> list[_Input]:
 
 def _pair(leader: _SeenPose, follower: _SeenPose, number: int, chart: TopicMap) -> _Input:
     """Frame of two poses. It is there once both are."""
-    own = topics_of(chart.scenario)
+    names = bodies_of(chart.scenario)
     bodies = [
-        msg.RigidBody(own.leader, [], leader.pose),
-        msg.RigidBody(own.follower, [], follower.pose),
+        msg.RigidBody(name, [], seen.pose) for name, seen in zip(names, (leader, follower), strict=True)
     ]
     frame = msg.RigidBodies(header(leader.stamp_ns, "world"), number, bodies)
     return _Input(topics.RIGID_BODIES, frame, leader.stamp_ns, max(leader.log_ns, follower.log_ns))
@@ -167,9 +168,10 @@ def _motions(log: Log, chart: TopicMap) -> list[_Input]:
         else:
             continue
         stamp_ns = _stamp_ns(record, message.header, chart)
+        frame_id, child_frame_id = odometry_frames(own.follower)
         odometry = msg.Odometry(
-            header=header(stamp_ns, f"{own.follower}/odom"),
-            child_frame_id=f"{own.follower}/base_footprint",
+            header=header(stamp_ns, frame_id),
+            child_frame_id=child_frame_id,
             pose=msg.PoseWithCovariance(pose=pose, covariance=_UNKNOWN_COVARIANCE),
             twist=twist,
         )

@@ -31,6 +31,7 @@ from hil.log.reader import Log
 from hil.nodes.frame_time import time_of, time_rules
 from hil.nodes.refusals import NOT_REFUSED
 from hil.scenario.leader_model import follower_mount, leader_mount, pose_noise
+from hil.scenario.links import bodies_of
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.message_checks import planar
@@ -86,9 +87,7 @@ def mounts_of_log(
     Times [s] are the source's own in an imported log, else they count from the first odometry.
     """
     names = topics_of(scenario)
-    wanted = [
-        name for name in (topics.RIGID_BODIES, names.odom, _leader_odometry(scenario)) if name in log.topics
-    ]
+    wanted = [name for name in (topics.RIGID_BODIES, names.odom, names.leader_odom) if name in log.topics]
     return mounts_of_events(
         logged_events(log, wanted), scenario, from_s, to_s, absolute=mode_of(log) == IMPORT
     )
@@ -128,17 +127,14 @@ def mounts_of_events(
     return Mounts(leader, follower, settings)
 
 
-def _leader_odometry(scenario: Scenario) -> str:
-    return f"{topics_of(scenario).leader}/odom"
-
-
 def body_tracks(events: Iterable[Timed], scenario: Scenario) -> BodyTracks:
     """What messages of ours tell of both bodies."""
     names, tracks = topics_of(scenario), BodyTracks({}, {}, {}, {})
-    reader = frame_reader(frozenset({names.leader, names.follower}))
-    wanted, leader_at = reader.pair(names.leader, names.follower), reader.names.index(names.leader)
+    leader, follower = bodies_of(scenario)
+    reader = frame_reader(frozenset({leader, follower}))
+    wanted, leader_at = reader.pair(leader, follower), reader.names.index(leader)
     times, rows, rules = NO_TIME_YET, time_rows(plain_rows_of), time_rules(scenario)
-    speeds = {names.odom: tracks.follower_speed, _leader_odometry(scenario): tracks.leader_speed}
+    speeds = {names.odom: tracks.follower_speed, names.leader_odom: tracks.leader_speed}
     for event, now_ns in events:
         if event.topic in speeds:
             try:

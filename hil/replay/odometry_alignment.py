@@ -19,6 +19,7 @@ from hil.nodes.frame_time import time_of, time_rules
 from hil.nodes.refusals import NOT_REFUSED
 from hil.replay.kept import Kept
 from hil.scenario.leader_model import follower_mount
+from hil.scenario.links import bodies_of
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.reading import RefusedError, read_frame, read_odometry
@@ -51,7 +52,7 @@ def own_record(log: Log, scenario: Scenario) -> OwnRecord:
                 sample = read_odometry(record.payload, record.log_ns)
                 motions[sample.stamp_ns] = (sample.v2, sample.u2)
             else:
-                frame = read_frame(record.payload, names.leader, names.follower)
+                frame = read_frame(record.payload, *bodies_of(scenario))
                 timed = time_of(times, rows, rules, frame, record.log_ns)
                 times = timed.times
                 if timed.refusal == NOT_REFUSED:

@@ -20,6 +20,7 @@ from hil.emulator.world import Odometry
 from hil.nodes.estimator import EstimatorNode, EstimatorState
 from hil.nodes.node import Counts, Outgoing
 from hil.replay.smoothing import ListeningEstimator, smoothed_estimates
+from hil.scenario.links import bodies_of
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.cdr import STAMP_BYTES, aligned
@@ -149,7 +150,7 @@ class _Feed:
     def __init__(self, tracks: PoseTracks, scenario: Scenario) -> None:
         names, n = topics_of(scenario), len(tracks.t_ns)
         self._times = tracks.t_ns.tolist()
-        self._frame = frame_template(MOCAP_FRAME, (names.leader, names.follower))
+        self._frame = frame_template(MOCAP_FRAME, bodies_of(scenario))
         self._odometry = odometry_template(*odometry_frames(names.follower))
         self._odom = names.odom
         self.seen = _whole(tracks.leader, tracks.follower)

@@ -171,7 +171,7 @@ def _own_scenario(log: Log) -> Scenario:
 
 def _estimator_of(link: Link) -> EstimatorNode:
     if link.scenario.estimator.kind == "smoother":
-        return ListeningEstimator(link.scenario, link.node_name("estimator"), link.others)
+        return ListeningEstimator(link.scenario, link.node_name("estimator"), link.other_bodies)
     return estimator_node(link)
 
 

@@ -19,7 +19,8 @@ from hil.errors import UsageError
 from hil.scenario.checked_toml import checked, locate, read_toml
 from hil.scenario.files import Overrides, merged_scenario, with_overrides
 from hil.scenario.links import refuse_chain
-from hil.scenario.schema import NonNegative, Scenario
+from hil.scenario.schema import Scenario
+from hil.scenario.section import NonNegative
 
 MAPS = "maps"
 

@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypeVar
 
 import msgspec
 from msgspec.structs import replace
 
 from hil.errors import UsageError
-from hil.scenario.schema import ChainSection, Scenario
+from hil.scenario.schema import ChainSection, FollowerSection, LeaderSection, Scenario
+from hil.scenario.section import PoseTriple
 from hil.scenario.start import chain_poses
+
+G = TypeVar("G")
+R = TypeVar("R", LeaderSection, FollowerSection)
 
 HOSTED = {
     "estimator": ("estimator",),
@@ -27,11 +32,13 @@ class Link:
 
     ``scenario``: the two as a pair: their names, start poses, and what is known of the predecessor; the
     leader's program in it drives the first agent only. ``others``: names of the further robots of the
-    chain, ``in_chain`` whether there is one, ``first`` whether the predecessor is the chain's leader.
+    chain, ``other_bodies``: of theirs in the motion capture. ``in_chain`` whether there is one, ``first``
+    whether the predecessor is the chain's leader.
     """
 
     scenario: Scenario
     others: frozenset[str] = frozenset()
+    other_bodies: frozenset[str] = frozenset()
     in_chain: bool = False
     first: bool = True
 
@@ -45,9 +52,26 @@ class Link:
         """Name of the follower."""
         return self.scenario.follower.name
 
+    @property
+    def bodies(self) -> tuple[str, str]:
+        """What the motion capture calls predecessor and follower."""
+        return bodies_of(self.scenario)
+
     def node_name(self, node: str) -> str:
         """What this follower's estimator or controller is called, in a chain such as estimator/agent3."""
         return f"{node}/{self.follower}" if self.in_chain else node
+
+
+def bodies_of(scenario: Scenario) -> tuple[str, str]:
+    """What the motion capture calls leader and follower, of a chain the first two agents."""
+    leader, follower = scenario.leader, scenario.follower
+    return str(_told(leader.body, leader.name)), str(_told(follower.body, follower.name))
+
+
+def namespaces_of(scenario: Scenario) -> tuple[str, str]:
+    """Namespaces of the topics of leader and follower, of a chain the first two agents; empty for none."""
+    leader, follower = scenario.leader, scenario.follower
+    return _told(leader.namespace, leader.name), _told(follower.namespace, follower.name)
 
 
 def chain_of(scenario: Scenario) -> ChainSection | None:
@@ -62,23 +86,30 @@ def links_of(scenario: Scenario) -> tuple[Link, ...]:
     """
     chain = chain_of(scenario)
     if chain is None:
+        _differ(scenario, bodies_of(scenario), "leader.body and follower.body")
+        _differ(scenario, namespaces_of(scenario), "leader.namespace and follower.namespace")
         return (Link(scenario),)
     names = _names(scenario, chain)
+    bodies = _further(scenario, chain, "bodies", chain.bodies, bodies_of(scenario), names)
+    namespaces = _further(scenario, chain, "namespaces", chain.namespaces, namespaces_of(scenario), names)
     poses = [(pose.x, pose.y, pose.theta) for pose in chain_poses(scenario, chain.agents)]
     control, robot = scenario.controller, scenario.robot
     k_v = min(control.v_max, robot.v_max) if isinstance(chain.k_v, msgspec.UnsetType) else chain.k_v
     k_u = min(control.u_max, robot.u_max) if isinstance(chain.k_u, msgspec.UnsetType) else chain.k_u
     links: list[Link] = []
-    for place, ((name, pose), (own_name, own_pose)) in enumerate(pairwise(zip(names, poses, strict=True))):
-        leader = replace(scenario.leader, name=name, pose=pose)
+    agents = zip(names, bodies, namespaces, poses, strict=True)
+    for place, (ahead, own) in enumerate(pairwise(agents)):
+        leader = _as_agent(scenario.leader, *ahead)
         pair = replace(
             scenario,
-            name=f"{scenario.name}/{own_name}",
+            name=f"{scenario.name}/{own[0]}",
             leader=replace(leader, k_v=k_v, k_u=k_u, mount=scenario.follower.mount) if place else leader,
-            follower=replace(scenario.follower, name=own_name, pose=own_pose),
+            follower=_as_agent(scenario.follower, *own),
             chain=msgspec.UNSET,
         )
-        links.append(Link(pair, frozenset(names) - {name, own_name}, in_chain=True, first=not place))
+        others = frozenset(names) - {ahead[0], own[0]}
+        other_bodies = frozenset(bodies) - {ahead[1], own[1]}
+        links.append(Link(pair, others, other_bodies, in_chain=True, first=not place))
     return tuple(links)
 
 
@@ -117,10 +148,41 @@ def _names(scenario: Scenario, chain: ChainSection) -> tuple[str, ...]:
             f"each of the {chain.agents} agents from the third on"
         )
     names = (scenario.leader.name, scenario.follower.name, *further)
-    twice = next((name for place, name in enumerate(names) if name in names[:place]), None)
+    _differ(scenario, names, "leader.name, follower.name and chain.names")
+    return names
+
+
+def _further(
+    scenario: Scenario,
+    chain: ChainSection,
+    key: str,
+    given: tuple[str | int, ...],
+    first: tuple[str, str],
+    names: tuple[str, ...],
+) -> tuple[str, ...]:
+    """What the agents are called elsewhere; by their names from the third on, unless told otherwise."""
+    if given and len(given) != chain.agents - 2:
+        raise UsageError(
+            f"scenario {scenario.name}: chain.{key} has {len(given)}, expected {chain.agents - 2}: one for "
+            f"each of the {chain.agents} agents from the third on"
+        )
+    called = (*first, *map(str, given or names[2:]))
+    _differ(scenario, called, f"chain.{key} and those of leader and follower")
+    return called
+
+
+def _differ(scenario: Scenario, called: Sequence[str], keys: str) -> None:
+    twice = next((each for place, each in enumerate(called) if each in called[:place]), None)
     if twice is not None:
         raise UsageError(
-            f"scenario {scenario.name}: {twice!r} stands for two robots of the chain, expected names that "
-            "differ; set leader.name, follower.name and chain.names"
+            f"scenario {scenario.name}: {twice!r} stands for two robots, expected names that differ; "
+            f"set {keys}"
         )
-    return names
+
+
+def _told(given: G | msgspec.UnsetType, name: str) -> G | str:
+    return name if isinstance(given, msgspec.UnsetType) else given
+
+
+def _as_agent(role: R, name: str, body: str, namespace: str, pose: PoseTriple) -> R:
+    return replace(role, name=name, body=body, namespace=namespace, pose=pose)

@@ -9,18 +9,22 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, get_args
 
-from msgspec import UNSET, Meta, Struct, UnsetType
+from msgspec import UNSET, Meta, UnsetType
 
-Positive = Annotated[float, Meta(gt=0.0)]
-Rate = Annotated[float, Meta(ge=0.01, le=10_000.0)]
-NonNegative = Annotated[float, Meta(ge=0.0)]
-Span = Annotated[float, Meta(ge=0.0, le=1e5)]
-Probability = Annotated[float, Meta(ge=0.0, lt=1.0)]
-Name = Annotated[str, Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
-PoseTriple = tuple[float, float, float]
-_Offset = Annotated[float, Meta(ge=-2.0, le=2.0)]
-_Yaw = Annotated[float, Meta(ge=-math.pi, le=math.pi)]
-MountTriple = tuple[_Offset, _Offset, _Yaw]
+from hil.scenario.emulated import MocapSection, RobotSection
+from hil.scenario.lab import SourceSection, WireSection
+from hil.scenario.section import (
+    BodyName,
+    MountTriple,
+    Name,
+    Namespace,
+    NonNegative,
+    PoseTriple,
+    Positive,
+    Rate,
+    Section,
+    Span,
+)
 
 LawName = Literal["independent", "ideal", "feedforward", "faded"]
 EstimatorName = Literal["ekf", "ukf", "ekf-filterpy", "ukf-filterpy", "imm", "shape-ekf", "mhe", "difference"]
@@ -35,11 +39,7 @@ ClockName = Literal["trusted", "estimated"]
 NoiseName = Literal["estimated", "given"]
 
 
-class _Section(Struct, frozen=True, forbid_unknown_fields=True):
-    """Base of all sections: immutable, and an unknown key is an error."""
-
-
-class RunSection(_Section, frozen=True, kw_only=True):
+class RunSection(Section, frozen=True, kw_only=True):
     """How long a run lasts, its random seed, and from when on it is judged."""
 
     duration_s: Positive = 30.0
@@ -47,7 +47,7 @@ class RunSection(_Section, frozen=True, kw_only=True):
     evaluate_from_s: NonNegative = 15.0
 
 
-class FormationSection(_Section, frozen=True, kw_only=True):
+class FormationSection(Section, frozen=True, kw_only=True):
     """The follower's station: its distance rho_0 [m], the leader's side, and the bearing it keeps it at.
 
     ``bearing``: angle [rad] between the follower's heading and the line to the leader, pi/2 abreast.
@@ -60,7 +60,7 @@ class FormationSection(_Section, frozen=True, kw_only=True):
     change_sides_at_s: tuple[NonNegative, ...] = ()
 
 
-class ControllerSection(_Section, frozen=True, kw_only=True):
+class ControllerSection(Section, frozen=True, kw_only=True):
     """The follower's law, its gains, and what the guard and the prediction assume.
 
     ``law``: independent of the leader's turn rate, ideal as the leader tells it, feedforward of the estimated
@@ -93,14 +93,14 @@ class ControllerSection(_Section, frozen=True, kw_only=True):
     mount_check: Literal["stop", "warn"] = "stop"
 
 
-class ConstantProgram(_Section, frozen=True, kw_only=True, tag="constant", tag_field="kind"):
+class ConstantProgram(Section, frozen=True, kw_only=True, tag="constant", tag_field="kind"):
     """Constant speed v and turn rate u."""
 
     v: NonNegative
     u: float = 0.0
 
 
-class SinusoidProgram(_Section, frozen=True, kw_only=True, tag="sinusoid", tag_field="kind"):
+class SinusoidProgram(Section, frozen=True, kw_only=True, tag="sinusoid", tag_field="kind"):
     """Constant speed v, turn rate u_mean + u_amplitude * sin(omega * t)."""
 
     v: NonNegative
@@ -109,7 +109,7 @@ class SinusoidProgram(_Section, frozen=True, kw_only=True, tag="sinusoid", tag_f
     omega: Positive
 
 
-class ImpulseProgram(_Section, frozen=True, kw_only=True, tag="impulse", tag_field="kind"):
+class ImpulseProgram(Section, frozen=True, kw_only=True, tag="impulse", tag_field="kind"):
     """Constant speed v, turn rate u_amplitude * exp(-(t - t_centre)^2 / (2 t_width^2))."""
 
     v: NonNegative
@@ -118,7 +118,7 @@ class ImpulseProgram(_Section, frozen=True, kw_only=True, tag="impulse", tag_fie
     t_width: Positive
 
 
-class TableProgram(_Section, frozen=True, kw_only=True, tag="table", tag_field="kind"):
+class TableProgram(Section, frozen=True, kw_only=True, tag="table", tag_field="kind"):
     """Speed v and turn rate u at the times t, linear in between and held at the ends.
 
     With v < 0 the leader drives backwards: alpha1 is that of its direction of travel, and v1 = abs(v).
@@ -129,114 +129,41 @@ class TableProgram(_Section, frozen=True, kw_only=True, tag="table", tag_field="
     u: list[float]
 
 
-class LeaderSection(_Section, frozen=True, kw_only=True):
+class LeaderSection(Section, frozen=True, kw_only=True):
     """The leader: its start pose (x, y, theta), its program and the limits that are known of it.
 
     ``v_eps <= v1 <= k_v`` and ``|u1| <= k_u`` (Assumption 1 of the paper).
     ``mount``: where its rigid body sits on it, as far as is known: x [m] ahead of the middle of the wheel
     axis, y [m] to the left of it, yaw [rad] from the robot's heading to the body's.
+    ``body``: what the motion capture calls it, name or streaming id. ``namespace``: of its topics, empty for
+    none. Both are ``name`` where they are left out.
     """
 
     pose: PoseTriple
     program: ConstantProgram | SinusoidProgram | ImpulseProgram | TableProgram
     name: Name = "leader"
+    body: BodyName | UnsetType = UNSET
+    namespace: Namespace | UnsetType = UNSET
     v_eps: Positive = 0.02
     k_v: Positive
     k_u: Positive
     mount: MountTriple = (0.0, 0.0, 0.0)
 
 
-class FollowerSection(_Section, frozen=True, kw_only=True):
-    """The follower: its start pose (x, y, theta), its name on the wire, and its body's mount as the leader's.
+class FollowerSection(Section, frozen=True, kw_only=True):
+    """The follower: its start pose (x, y, theta), its names, and its body's mount as the leader's.
 
     In a chain every follower has this mount.
     """
 
     pose: PoseTriple
     name: Name = "follower"
+    body: BodyName | UnsetType = UNSET
+    namespace: Namespace | UnsetType = UNSET
     mount: MountTriple = (0.0, 0.0, 0.0)
 
 
-class OdometryFaultSection(_Section, frozen=True, kw_only=True):
-    """A fault of the emulated odometry of all followers, ``at_s`` after the leader set off.
-
-    ``silent``: no samples; ``nan``: a twist of NaN; ``zero``: a twist of 0 with a right pose; ``reversed``:
-    both with the opposite sign; ``scale``: both times ``factor``; ``delay``: samples come, and are stamped,
-    ``delay_s`` later; ``commands``: the twist tells what the robot was told to drive; ``slip``: the share
-    ``factor`` |u2| (u2 in rad/s, at most 0.9) of what the wheels turn is lost; ``reset``: the pose begins
-    anew at its origin, once. ``duration_s`` 0 stands for good.
-    """
-
-    kind: Literal["silent", "nan", "zero", "reversed", "scale", "delay", "slip", "reset", "commands"]
-    at_s: NonNegative
-    duration_s: NonNegative = 0.0
-    factor: float = 0.5
-    delay_s: Span = 0.2
-
-
-class RobotSection(_Section, frozen=True, kw_only=True):
-    """The emulated robots: first-order actuator lag, limits, command resolution, wheel odometry.
-
-    Odometry is noisy, stamped ``odometry_delay_s`` later than the motion that it tells of, and tells the
-    motion times ``odometry_scale_v`` and ``odometry_scale_u``; its pose adds that up, without noise.
-    """
-
-    lag_s: NonNegative = 0.1
-    v_max: Positive = 0.22
-    u_max: Positive = 2.84
-    v_resolution: NonNegative = 0.01
-    u_resolution: NonNegative = 0.01
-    odometry_rate_hz: Rate = 30.0
-    odometry_sigma_v: NonNegative = 0.002
-    odometry_sigma_u: NonNegative = 0.01
-    odometry_delay_s: Span = 0.0
-    odometry_scale_v: Positive = 1.0
-    odometry_scale_u: Positive = 1.0
-    odometry_faults: tuple[OdometryFaultSection, ...] = ()
-
-
-class FaultSection(_Section, frozen=True, kw_only=True):
-    """A fault of the emulated motion capture, ``at_s`` after the leader set off; the truth stays true.
-
-    ``step``: a body shown ``offset`` [m] aside; ``turn``: turned by ``angle`` [rad]; ``swap``: each body
-    under the other's name; ``freeze``: a body's last pose again and again; ``dropout``: no frames.
-    ``duration_s`` 0 stands for one frame.
-    """
-
-    kind: Literal["step", "turn", "swap", "freeze", "dropout"]
-    at_s: NonNegative
-    duration_s: NonNegative = 0.0
-    body: Literal["leader", "follower", "both"] = "leader"
-    offset: tuple[float, float] = (0.02, 0.0)
-    angle: float = math.pi
-
-
-class MocapSection(_Section, frozen=True, kw_only=True):
-    """The emulated motion capture: noise of a moving body, the share a standing one has, delivery.
-
-    Its clock is ahead of the host's by ``clock_offset_s``, runs faster by ``clock_drift_ppm``, and jumps by
-    ``clock_jump_s`` when the leader has been driving for ``clock_jump_at_s``.
-    ``leader_mount``, ``follower_mount``: where the bodies really sit on the robots, as ``leader.mount`` says
-    what is known of it.
-    """
-
-    rate_hz: Rate = 120.0
-    sigma_position: NonNegative = 0.0003
-    sigma_heading: NonNegative = 0.0035
-    static_fraction: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.05
-    latency_s: Span = 0.03
-    jitter_s: Span = 0.0
-    loss: Probability = 0.0
-    clock_offset_s: Annotated[float, Meta(ge=-1.7e9, le=1e8)] = 0.0
-    clock_drift_ppm: Annotated[float, Meta(ge=-500.0, le=500.0)] = 0.0
-    clock_jump_s: Annotated[float, Meta(ge=-1e7, le=1e7)] = 0.0
-    clock_jump_at_s: NonNegative = 0.0
-    leader_mount: MountTriple = (0.0, 0.0, 0.0)
-    follower_mount: MountTriple = (0.0, 0.0, 0.0)
-    faults: tuple[FaultSection, ...] = ()
-
-
-class EstimatorSection(_Section, frozen=True, kw_only=True):
+class EstimatorSection(Section, frozen=True, kw_only=True):
     """The estimator: which one, what it measures with, and its noise by rule.
 
     ``front_end`` world: leader position and follower pose from mocap; body: range and bearing of the leader
@@ -312,23 +239,26 @@ class EstimatorSection(_Section, frozen=True, kw_only=True):
     certify: bool = False
 
 
-class ChainSection(_Section, frozen=True, kw_only=True):
+class ChainSection(Section, frozen=True, kw_only=True):
     """A chain of agents: each follows the one before it, within the controller's limits.
 
     The leader is the first agent and the follower the second. Every further agent starts in the same shape
     to its predecessor as the second to the first, and keeps to the same law, gains and limits.
-    ``names``: on the wire, of the agents from the third on; without them agent3, agent4 and so on. ``k_v``
+    ``names``: of the agents from the third on; without them agent3, agent4 and so on. ``bodies`` and
+    ``namespaces``: theirs in the motion capture and on the wire, where these are others. ``k_v``
     [m/s], ``k_u`` [rad/s]: what is known of a follower as somebody's predecessor, in place of the leader's;
     without them the lower of the controller's and the robot's limits.
     """
 
     agents: Annotated[int, Meta(ge=2, le=1000)]
     names: tuple[Name, ...] = ()
+    bodies: tuple[BodyName, ...] = ()
+    namespaces: tuple[Namespace, ...] = ()
     k_v: Positive | UnsetType = UNSET
     k_u: Positive | UnsetType = UNSET
 
 
-class FlockSection(_Section, frozen=True, kw_only=True):
+class FlockSection(Section, frozen=True, kw_only=True):
     """A flock of agents in an arrowhead: each follows the mean of its nearest neighbours, within the limits.
 
     Its places have the distance ``formation.rho_0`` from each other and the leader at the tip; whom an agent
@@ -346,7 +276,7 @@ class FlockSection(_Section, frozen=True, kw_only=True):
     scatter_heading: Annotated[float, Meta(ge=0.0, le=math.pi)] = 0.0
 
 
-class Scenario(_Section, frozen=True, kw_only=True):
+class Scenario(Section, frozen=True, kw_only=True):
     """A whole experiment, its sections and their keys as ``docs/scenario.md`` has them; it does not change.
 
     Build it with :func:`hil.scenario.files.load_scenario`.
@@ -367,5 +297,7 @@ class Scenario(_Section, frozen=True, kw_only=True):
     robot: RobotSection = RobotSection()
     mocap: MocapSection = MocapSection()
     estimator: EstimatorSection = EstimatorSection()
+    source: SourceSection = SourceSection()
+    wire: WireSection = WireSection()
     chain: ChainSection | UnsetType = UNSET
     flock: FlockSection | UnsetType = UNSET

@@ -20,7 +20,8 @@ from hil.extensions.reference import found, is_reference, short
 from hil.scenario.brought import settled_references
 from hil.scenario.checked_toml import checked, locate, read_toml
 from hil.scenario.files import load_scenario, with_overrides
-from hil.scenario.schema import NonNegative, Positive, Probability, Scenario
+from hil.scenario.schema import Scenario
+from hil.scenario.section import NonNegative, Positive, Probability
 from hil.sweep.refusals import refuse_unsweepable
 
 SHORTEST_S = 1.0

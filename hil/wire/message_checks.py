@@ -89,7 +89,7 @@ def check_frame(head: FrameHead, bodies: Rows[Body], wanted: Wanted) -> Frame:
     first, second = load(Body, bodies, wanted.leader), load(Body, bodies, wanted.follower)
     cause = _pair_cause(first.seen, second.seen, strangers)
     if cause == ACCEPTED:
-        cause = place_cause(first.place)
+        cause = leader_cause(first.place)
     if cause == ACCEPTED:
         cause = place_cause(second.place)
     if cause != ACCEPTED:
@@ -132,6 +132,23 @@ def place_cause(place: Placement) -> int:
 
 
 @kernel
+def leader_cause(place: Placement) -> int:
+    """The same of the leader, of whom the position is all that is used: it may lack an orientation."""
+    if has_orientation(place):
+        return place_cause(place)
+    if not (math.isfinite(place.x) and math.isfinite(place.y) and math.isfinite(place.z)):
+        return NOT_FINITE
+    far = abs(place.x) > FARTHEST or abs(place.y) > FARTHEST or abs(place.z) > FARTHEST
+    return OUT_OF_RANGE if far else ACCEPTED
+
+
+@kernel
+def has_orientation(place: Placement) -> bool:
+    """Whether a body's quaternion is one; a single marker has zeros or NaN there."""
+    return abs(_norm(place) - 1.0) <= _UNIT_TOLERANCE
+
+
+@kernel
 def _all_finite(p: Placement) -> bool:
     return (
         math.isfinite(p.x)
@@ -164,7 +181,12 @@ def _norm(p: Placement) -> float:
 
 @kernel
 def planar(place: Placement) -> Pose:
-    """Ground pose of a body with z up whose place has no cause against it; its heading is its x axis' yaw."""
+    """Ground pose of a body with z up whose place has no cause against it; its heading is its x axis' yaw.
+
+    A leader without an orientation gets heading 0.
+    """
+    if not has_orientation(place):
+        return Pose(place.x, place.y, 0.0)
     norm = _norm(place)
     x, y, z, w = place.qx / norm, place.qy / norm, place.qz / norm, place.qw / norm
     return Pose(place.x, place.y, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import zenoh
 
 from hil.wire.events import TICK, Event
+from hil.wire.key_layout import OURS, KeyLayout
 from hil.wire.topics import STOP
 
 INBOX_LIMIT = 100_000
@@ -39,12 +40,15 @@ class Inbox:
 
 
 class Wire:
-    """Subscriptions into one inbox, and publishers that are declared when first used."""
+    """Subscriptions into one inbox, and publishers that are declared when first used.
 
-    def __init__(self, session: zenoh.Session, urgent: Iterable[str] = ()) -> None:
+    ``urgent``: topics that go ahead of all others; ``layout``: the keys of topics.
+    """
+
+    def __init__(self, session: zenoh.Session, urgent: Iterable[str] = (), layout: KeyLayout = OURS) -> None:
         self.inbox = Inbox()
         self._session = session
-        self._urgent = frozenset(urgent)
+        self._urgent, self._layout = frozenset(urgent), layout
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._subscribers: list[zenoh.Subscriber[None]] = []
         self._lock = threading.Lock()
@@ -61,7 +65,7 @@ class Wire:
                 self.inbox.put(Event(topic, sample.payload.to_bytes()))
 
             direct = zenoh.handlers.Callback(keep, indirect=False)
-            self._subscribers.append(self._session.declare_subscriber(topic, direct))
+            self._subscribers.append(self._session.declare_subscriber(self._layout.key(topic), direct))
 
     def publish(self, topic: str, payload: bytes) -> None:
         """Send a payload; urgent topics go ahead of all others.
@@ -98,7 +102,7 @@ class Wire:
         must_arrive = topic == STOP
         congestion = zenoh.CongestionControl.BLOCK if must_arrive else zenoh.CongestionControl.DROP
         publisher = self._session.declare_publisher(
-            topic,
+            self._layout.key(topic),
             # Alone in its packet; what many robots are told at once shares one, which halves what it costs.
             express=must_arrive,
             priority=zenoh.Priority.REAL_TIME if urgent else zenoh.Priority.DATA,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hil.scenario.links import Link, links_of
+from hil.scenario.links import Link, links_of, namespaces_of
 from hil.scenario.schema import Scenario
 from hil.wire.message_types import (
     CertifiedEstimate,
@@ -34,9 +34,17 @@ ONLY_IN_LOGS = (MALFORMED, LOG)
 """Topics that are no part of what robots and daemons say: whoever records writes them."""
 
 
+def within(namespace: str, name: str) -> str:
+    """A name in a namespace, which may be empty."""
+    return f"{namespace}/{name}" if namespace else name
+
+
 @dataclass(frozen=True, slots=True)
 class Topics:
-    """The topics of one leader and one follower. ``truth``: where the emulator tells their true state."""
+    """The topics of a leader and a follower in namespaces of theirs, empty for none.
+
+    ``truth``: where the emulator tells their true state.
+    """
 
     leader: str
     follower: str
@@ -46,47 +54,47 @@ class Topics:
     @property
     def leader_odom(self) -> str:
         """Wheel odometry of the leader; the follower does not read it."""
-        return f"{self.leader}/odom"
+        return within(self.leader, "odom")
 
     @property
     def leader_cmd_vel(self) -> str:
         """What the leader is told to drive; read by the law ``ideal`` only, which needs its turn rate."""
-        return f"{self.leader}/cmd_vel"
+        return within(self.leader, "cmd_vel")
 
     @property
     def odom(self) -> str:
         """Wheel odometry of the follower."""
-        return f"{self.follower}/odom"
+        return within(self.follower, "odom")
 
     @property
     def cmd_vel(self) -> str:
         """What the follower is told to drive."""
-        return f"{self.follower}/cmd_vel"
+        return within(self.follower, "cmd_vel")
 
     @property
     def sighting(self) -> str:
         """Range and bearing of the leader from a sensor on the follower."""
-        return f"{self.follower}/leader_sighting"
+        return within(self.follower, "leader_sighting")
 
     @property
     def estimate(self) -> str:
         """What the follower believes of the leader."""
-        return f"{self.follower}/leader_estimate"
+        return within(self.follower, "leader_estimate")
 
     @property
     def certified(self) -> str:
         """The same with guaranteed error radii, where ``estimator.certify`` asks for them."""
-        return f"{self.follower}/certified"
+        return within(self.follower, "certified")
 
     @property
     def command(self) -> str:
         """The controller's decision with its reasons."""
-        return f"{self.follower}/command"
+        return within(self.follower, "command")
 
     @property
     def side(self) -> str:
         """Orders to the follower: the side of its leader that it is to drive on, left or right."""
-        return f"{self.follower}/side"
+        return within(self.follower, "side")
 
     @property
     def types(self) -> dict[str, str]:
@@ -120,8 +128,9 @@ def link_topics(link: Link) -> Topics:
     """Topics of a follower and its predecessor. In a chain the truth has the follower's name too."""
     scenario = link.scenario
     stamped = scenario.controller.command_type == "TwistStamped"
-    truth = f"{scenario.follower.name}/{TRUTH}" if link.in_chain else TRUTH
-    return Topics(scenario.leader.name, scenario.follower.name, stamped, truth)
+    leader, follower = namespaces_of(scenario)
+    truth = within(follower, TRUTH) if link.in_chain else TRUTH
+    return Topics(leader, follower, stamped, truth)
 
 
 def urgent_topics(scenario: Scenario) -> tuple[str, ...]:

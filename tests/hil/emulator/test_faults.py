@@ -12,8 +12,8 @@ from hil.emulator.node import EmulatorNode
 from hil.errors import UsageError
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import read_log
+from hil.scenario.emulated import FaultSection
 from hil.scenario.files import load_scenario
-from hil.scenario.schema import FaultSection
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.messages import decode_as, to_ns

@@ -19,8 +19,8 @@ from hil.emulator.odometry_faults import (
 )
 from hil.emulator.plant import Plant
 from hil.emulator.world import NOTHING, ODOMETRY, SAMPLE, Odometry
+from hil.scenario.emulated import OdometryFaultSection
 from hil.scenario.files import load_scenario
-from hil.scenario.schema import OdometryFaultSection
 from hil.scenario.start import chain_poses
 
 EPOCH_NS = 1_767_225_600_000_000_000

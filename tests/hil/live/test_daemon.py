@@ -16,6 +16,7 @@ from hil.log.metadata import scenario_of
 from hil.log.reader import Log, read_log
 from hil.nodes.node import Outgoing, outgoing
 from hil.replay.rerun import replay
+from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.events import Event, digest
@@ -120,7 +121,7 @@ def test_who_breaks_down_says_stop_before_it_ends() -> None:
         ear.subscribe([topics.STOP])
         try:
             with pytest.raises(ZeroDivisionError):
-                run_daemon(Breaking, [topics.STOP], Endpoints(connect=endpoint), Ending())
+                run_daemon(Breaking, load_scenario("turtlebot3"), Endpoints(connect=endpoint), Ending())
             heard = ear.inbox.take(PATIENCE)
         finally:
             ear.close()

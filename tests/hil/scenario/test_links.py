@@ -8,7 +8,8 @@ from formation.pose import Pose
 from formation.shape import shape_of
 from hil.errors import UsageError
 from hil.scenario.files import load_scenario, merged_scenario
-from hil.scenario.links import Link, link_of, links_of, node_names
+from hil.scenario.links import Link, link_of, links_of, namespaces_of, node_names
+from hil.wire.topics import link_topics
 
 CHAIN = ["chain.agents=4", 'chain.names=["anna", "otto"]']
 
@@ -72,3 +73,35 @@ def test_mistakes_are_named() -> None:
         link_of(load_scenario("turtlebot3", CHAIN), "ann")
     with pytest.raises(UsageError, match=r"\[chain\] of 5 agents, expected a pair; a recording is of two"):
         merged_scenario({"base": "chain5"}, "mine", "map mine")
+
+
+def test_bodies_and_namespaces_are_the_names_unless_a_lab_has_others() -> None:
+    (plain,) = links_of(load_scenario("turtlebot3"))
+    assert (plain.bodies, namespaces_of(plain.scenario)) == (("leader", "follower"),) * 2
+    lab = ["leader.body=1", "follower.body=burger two", "leader.namespace=", "follower.namespace=tb3/b"]
+    (named,) = links_of(load_scenario("turtlebot3", lab))
+    assert (named.bodies, namespaces_of(named.scenario)) == (("1", "burger two"), ("", "tb3/b"))
+    pair = link_topics(named)
+    assert (pair.leader_cmd_vel, pair.odom, named.follower) == ("cmd_vel", "tb3/b/odom", "follower")
+
+
+def test_every_agent_of_a_chain_has_a_body_and_a_namespace() -> None:
+    given = ["chain.agents=4", 'chain.bodies=["3","4"]', 'chain.namespaces=["c","d"]', "follower.body=2"]
+    links = links_of(load_scenario("turtlebot3", given))
+    assert [link.bodies for link in links] == [("leader", "2"), ("2", "3"), ("3", "4")]
+    assert [sorted(link.other_bodies) for link in links] == [["3", "4"], ["4", "leader"], ["2", "leader"]]
+    assert [link_topics(link).odom for link in links] == ["follower/odom", "c/odom", "d/odom"]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["leader.body=1", "follower.body=1"], "'1' stands for two robots.*leader.body and follower.body"),
+        (["leader.namespace=", "follower.namespace="], "'' stands for two robots.*namespace"),
+        (["chain.agents=3", "follower.body=agent3"], "'agent3' stands for two robots.*chain.bodies"),
+        (["chain.agents=3", 'chain.namespaces=["a","b"]'], "chain.namespaces has 2, expected 1"),
+    ],
+)
+def test_one_name_is_one_robot(given: list[str], said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        links_of(load_scenario("turtlebot3", given))

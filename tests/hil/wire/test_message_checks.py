@@ -152,8 +152,19 @@ def test_a_pair_is_each_body_once(leaders: int, followers: int, strangers: int, 
 )
 def test_a_place_that_is_none_refuses_the_frame_whosever_it_is(bad: dict[str, float], cause: Cause) -> None:
     assert place_cause(place(**bad)) == cause
-    assert checked(leader=Body(1, place(**bad))) == refused(cause)
     assert checked(follower=Body(1, place(**bad))) == refused(cause)
+    lacks_orientation = cause == Cause.BAD_QUATERNION or (
+        cause in (Cause.NOT_FINITE, Cause.OUT_OF_RANGE) and bad.keys() & {"qx", "qy", "qz", "qw"}
+    )
+    assert checked(leader=Body(1, place(**bad))).cause == (Cause.ACCEPTED if lacks_orientation else cause)
+
+
+@pytest.mark.parametrize("none", [0.0, math.nan])
+def test_of_a_leader_without_orientation_the_position_is_taken(none: float) -> None:
+    marker = place(x=1.5, qx=none, qy=none, qz=none, qw=none)
+    found = checked(leader=Body(1, marker))
+    assert (found.cause, found.leader) == (Cause.ACCEPTED, (1.5, place().y))
+    assert planar(marker) == Pose(1.5, place().y, 0.0)
 
 
 @pytest.mark.parametrize(
