@@ -119,17 +119,30 @@ def daemon_command(name: str, summary: str) -> click.Command:
 
 
 def _emulator(order: Order) -> Worker:
+    from hil.emulator.foreign_mocap import ForeignMocapNode
     from hil.emulator.node import EmulatorNode
     from hil.live.node_worker import NodeWorker
+    from hil.wire import topics
+    from hil.wire.source_topics import converts
 
-    return NodeWorker([EmulatorNode(order.scenario, order.needs)], on_report=_on_report())
+    emulator = EmulatorNode(order.scenario, order.needs)
+    if not converts(order.scenario):
+        return NodeWorker([emulator], on_report=_on_report())
+    frames = (topics.RIGID_BODIES,)
+    foreign = ForeignMocapNode(order.scenario)
+    return NodeWorker([emulator, foreign], within=frames, on_report=_on_report(), unspoken=frames)
 
 
 def _estimator(order: Order) -> Worker:
     from hil.live.node_worker import NodeWorker
-    from hil.nodes.link_nodes import estimator_node
+    from hil.nodes.link_nodes import estimator_node, frames_within, source_nodes
 
-    return NodeWorker([estimator_node(link) for link in order.links], on_report=_on_report())
+    source = source_nodes(order.links, order.scenario)
+    return NodeWorker(
+        [*source, *map(estimator_node, order.links)],
+        within=frames_within(source),
+        on_report=_on_report(),
+    )
 
 
 def _controller(order: Order) -> Worker:
@@ -147,12 +160,13 @@ def _controller(order: Order) -> Worker:
 
 def _follower(order: Order) -> Worker:
     from hil.live.node_worker import NodeWorker
-    from hil.nodes.link_nodes import controller_node, estimator_node
+    from hil.nodes.link_nodes import controller_node, estimator_node, frames_within, source_nodes
 
     controllers = [controller_node(link) for link in order.links]
+    source = source_nodes(order.links, order.scenario)
     return NodeWorker(
-        [*map(estimator_node, order.links), *controllers],
-        within=[node.topics.estimate for node in controllers],
+        [*source, *map(estimator_node, order.links), *controllers],
+        within=[*frames_within(source), *(node.topics.estimate for node in controllers)],
         parting=_parting("follower", order),
         after_tick=remarks_on({node.law for node in controllers}),
         on_report=_on_report(),
