@@ -18,6 +18,7 @@ _HOW_SERVED = struct.Struct("<QH?4B")
 _ECHO = struct.Struct("<Q")
 _ECHOED = struct.Struct("<QQ")
 _ANSWER = struct.Struct("<i")
+_RATE = struct.Struct("<f")
 _OPTIONS = struct.Struct("<?4B")
 
 
@@ -136,6 +137,11 @@ def read_echo(reader: DatagramReader) -> Echo:
 def response(code: int) -> bytes:
     """Answer a request in words by a number, 0 for done."""
     return packet(Kind.RESPONSE, _ANSWER.pack(code))
+
+
+def rate_response(rate_hz: float) -> bytes:
+    """Answer the request for the rate of frames."""
+    return packet(Kind.RESPONSE, _RATE.pack(rate_hz))
 
 
 def server_info(info: ServerInfo) -> bytes:
