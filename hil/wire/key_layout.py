@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from msgspec import UnsetType
 
 from hil.scenario.schema import Scenario
-from hil.wire.topics import RIGID_BODIES
+from hil.wire.source_topics import source_names
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +34,6 @@ OURS = KeyLayout()
 
 def layout_of(scenario: Scenario) -> KeyLayout:
     """Layout of a scenario's topics."""
-    given, source = scenario.wire.topics, scenario.source
-    names = {} if isinstance(given, UnsetType) else {topic: name.strip("/") for topic, name in given.items()}
-    if source.type == "RigidBodies" and source.topic:
-        names.setdefault(RIGID_BODIES, source.topic.strip("/"))
-    return KeyLayout(scenario.wire.prefix, names)
+    given = scenario.wire.topics
+    named = {} if isinstance(given, UnsetType) else {topic: name.strip("/") for topic, name in given.items()}
+    return KeyLayout(scenario.wire.prefix, source_names(scenario) | named)

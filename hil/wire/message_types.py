@@ -71,6 +71,24 @@ class RigidBodies:
 
 
 @dataclass(slots=True)
+class NamedPose:
+    """One body of a :class:`NamedPoseArray`."""
+
+    name: str
+    pose: Pose
+    __msgtype__: ClassVar[str] = "motion_capture_tracking_interfaces/msg/NamedPose"
+
+
+@dataclass(slots=True)
+class NamedPoseArray:
+    """One motion-capture frame as motion_capture_tracking sends it, stamped at its receipt or not at all."""
+
+    header: Header
+    poses: Sequence[NamedPose]
+    __msgtype__: ClassVar[str] = "motion_capture_tracking_interfaces/msg/NamedPoseArray"
+
+
+@dataclass(slots=True)
 class Consumed:
     """Receipt of one input: digest of its payload and when it was taken in."""
 
@@ -185,6 +203,8 @@ OWN_TYPES: tuple[type[Message], ...] = (
     Marker,
     RigidBody,
     RigidBodies,
+    NamedPose,
+    NamedPoseArray,
     Consumed,
     LeaderEstimate,
     CertifiedEstimate,
