@@ -27,6 +27,7 @@ COMMANDS = {
     "estimator": "the estimator, as a daemon",
     "controller": "the controller, as a daemon",
     "recorder": "the recorder, as a daemon",
+    "bridge": "motion captures of others brought to the wire, as a daemon",
 }
 _MODULES = {"import": "import_recording"}
 _DAEMONS = ("emulator", "follower", "estimator", "controller", "recorder")

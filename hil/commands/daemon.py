@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from formation.collector import collector_paused
+from hil.commands.natnet_options import NatNetOptions, natnet_options, served
 from hil.commands.own_parts import load_own_parts, remarks_on
 from hil.commands.seconds import DURATION
 from hil.errors import UsageError
@@ -19,7 +20,7 @@ from hil.scenario.links import HOSTED, Link, link_of, links_of
 from hil.scenario.schema import Scenario
 
 if TYPE_CHECKING:
-    from hil.live.daemon import Worker
+    from hil.live.daemon import Ending, Worker
     from hil.live.node_worker import Parting
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -30,13 +31,14 @@ class Order:
     """What a daemon is started for.
 
     ``links``: the followers that it serves, if it serves any. ``out``: the recorder's log.
-    ``needs``: the daemons that the emulator waits for.
+    ``needs``: the daemons that the emulator waits for. ``natnet``: how it serves its frames by NatNet.
     """
 
     scenario: Scenario
     links: tuple[Link, ...]
     out: Path | None
     needs: frozenset[str]
+    natnet: NatNetOptions
 
 
 def daemon_command(name: str, summary: str) -> click.Command:
@@ -54,6 +56,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         followers: tuple[str, ...] = (),
         tethered: bool = False,
         certify: bool = False,
+        **natnet: Any,
     ) -> None:
         # Wire and messages take a third of a second to load, which help needs not.
         with collector_paused():
@@ -66,6 +69,8 @@ def daemon_command(name: str, summary: str) -> click.Command:
         ending.on_signals()
         if tethered:
             ending.on_parent_gone()
+        options = NatNetOptions(**natnet)
+        alone = options.natnet and not (connect or listen or zenoh_config)
         if not (connect or listen or zenoh_config):
             connect = DEFAULT_ENDPOINT
         chosen = load_scenario(scenario, (*overrides, CERTIFY) if certify else overrides)
@@ -73,7 +78,10 @@ def daemon_command(name: str, summary: str) -> click.Command:
             load_own_parts(chosen, estimates=name != "controller")
         needed = frozenset(filter(None, needs.split(",")))
         links = tuple(link_of(chosen, name) for name in dict.fromkeys(followers)) or links_of(chosen)
-        order = Order(chosen, links, out, needed)
+        order = Order(chosen, links, out, needed, options)
+        if alone:
+            _serve_alone(order, ending, duration)
+            return
         endpoints = Endpoints(connect, listen, zenoh_config)
 
         def say_ready() -> None:
@@ -115,6 +123,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         options.append(
             click.Option(["--needs"], default="estimator,controller", show_default=True, help=needs)
         )
+        options += natnet_options()
     return click.Command(name, callback=callback, params=options, help=f"Run {summary}.")
 
 
@@ -125,12 +134,28 @@ def _emulator(order: Order) -> Worker:
     from hil.wire import topics
     from hil.wire.source_topics import converts
 
-    emulator = EmulatorNode(order.scenario, order.needs)
+    node = EmulatorNode(order.scenario, order.needs)
+    if order.natnet.natnet:
+        from hil.bridge.natnet_emulator import NatNetEmulator
+
+        emulator = NatNetEmulator(node, order.natnet.serving(), on_report=_on_report())
+        click.echo(f"abreast emulator: serves {served(emulator, order.natnet.natnet_address)}", err=True)
+        return emulator
     if not converts(order.scenario):
-        return NodeWorker([emulator], on_report=_on_report())
+        return NodeWorker([node], on_report=_on_report())
     frames = (topics.RIGID_BODIES,)
     foreign = ForeignMocapNode(order.scenario)
-    return NodeWorker([emulator, foreign], within=frames, on_report=_on_report(), unspoken=frames)
+    return NodeWorker([node, foreign], within=frames, on_report=_on_report(), unspoken=frames)
+
+
+def _serve_alone(order: Order, ending: Ending, duration_s: float | None) -> None:
+    """Run the emulator without a wire: the leader drives its program, the followers stand."""
+    from hil.bridge.natnet_emulator import NatNetEmulator, run_alone
+    from hil.emulator.node import EmulatorNode
+
+    emulator = NatNetEmulator(EmulatorNode(order.scenario), order.natnet.serving(), alone=True)
+    line = f"abreast emulator: ready, serves {served(emulator, order.natnet.natnet_address)}"
+    run_alone(emulator, ending, duration_s, lambda: click.echo(line, err=True))
 
 
 def _estimator(order: Order) -> Worker:
