@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from formation.angles import FloatArray
 from hil.errors import UsageError
-from hil.recordings.pair_log import Times
+from hil.recordings.pair_log import Times, known_rows
 
 _TURNED_ENOUGH = 0.02  # mean square of a rotation's vector part: turns of some 15 degrees
 _CLEARLY = 4.0
@@ -75,7 +75,7 @@ def found_up(tracks: Sequence[FloatArray], told: str) -> str:
     """
     turns, spread = np.zeros(3), np.zeros(3)
     for placements in tracks:
-        seen = placements[np.isfinite(placements).all(axis=1)]
+        seen = placements[known_rows(placements)]
         if len(seen) < 2:
             continue
         rotation = Rotation.from_quat(seen[:, 3:])
@@ -102,11 +102,6 @@ def turned_up(placements: FloatArray, up: str) -> FloatArray:
     if up == "x":
         return np.column_stack([y, z, x, qy, qz, qx, qw])
     return placements
-
-
-def lost_rows(placements: FloatArray) -> int:
-    """Rows in which a body is not seen."""
-    return int(np.count_nonzero(~np.isfinite(placements).all(axis=1)))
 
 
 def at_times(t_ns: Times, placements: FloatArray, moments_ns: Times, most_ns: int) -> FloatArray:

@@ -74,8 +74,8 @@ def find_layout(lines: Sequence[str], delimiter: str | None = None, decimal: str
         delimiter = _delimiter(sample)
     if decimal is None:
         cells = [cell for line in sample[1:] for cell in split_line(line, delimiter)]
-        commas = delimiter != "," and any(_COMMA_NUMBER.fullmatch(cell) for cell in cells)
-        decimal = "," if commas else "."
+        # Between commas such a cell is one in quotes.
+        decimal = "," if any(_COMMA_NUMBER.fullmatch(cell) for cell in cells) else "."
     return Layout(delimiter, decimal)
 
 
@@ -185,7 +185,7 @@ def numbers(column: pa.ChunkedArray, decimal: str) -> tuple[FloatArray, dict[int
     except pa.ArrowInvalid:
         plain = cells.to_pylist()
         values = pa.array([None if cell is None else _number(cell) for cell in plain], pa.float64())
-    found: FloatArray = np.array(values.to_numpy(), dtype=np.float64)
+    found: FloatArray = np.asarray(values).astype(np.float64)
     given = np.asarray(pc.is_valid(cells))
     wrong = np.flatnonzero(given & ~np.isfinite(found))
     found[wrong] = np.nan

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from formation.angles import FloatArray
-from hil.recordings.pair_log import Recorded, Times
+from hil.recordings.pair_log import Recorded, Times, known_rows
 from hil.scenario.files import with_overrides
 from hil.scenario.schema import Scenario
 
@@ -53,11 +53,11 @@ def at_rate_of(recorded: Recorded, scenario: Scenario) -> Scenario:
     measured = recorded.leader if recorded.leader is not None else recorded.sighting
     if measured is None:
         return scenario
-    rate = rate_of(recorded.t_ns[np.isfinite(measured).all(axis=1)])
+    rate = rate_of(recorded.t_ns[known_rows(measured)])
     if not 1.0 <= rate <= 1000.0:
         return scenario
     return with_overrides(scenario, {"mocap.rate_hz": float(f"{rate:.6g}")})
 
 
 def _missing(values: FloatArray | None) -> int:
-    return 0 if values is None else int(np.count_nonzero(~np.isfinite(values).all(axis=1)))
+    return 0 if values is None else int(np.count_nonzero(~known_rows(values)))

@@ -126,7 +126,7 @@ def _with_unit(words: list[str]) -> tuple[list[str], str | None]:
     """Words without a unit at their end, as in x_mm or v_m_s."""
     if len(words) > 2 and words[-1] == "s" and is_unit(f"{words[-2]}/s"):
         return words[:-2], f"{words[-2]}/s"
-    if len(words) > 1 and words[-1] not in _TIME | {"in"} and is_unit(words[-1]):
+    if len(words) > 1 and words[-1] not in _TIME | {"in", "1"} and is_unit(words[-1]):
         return words[:-1], spelled(words[-1])
     return words, None
 

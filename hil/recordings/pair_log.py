@@ -84,6 +84,11 @@ def write_pair(out: Path, recorded: Recorded, scenario: Scenario, source: Mappin
     return log.messages
 
 
+def known_rows(values: FloatArray) -> NDArray[np.bool_]:
+    """Whether each row of ``values`` (n, k) is known: has no NaN."""
+    return np.asarray(np.isfinite(values).all(axis=1), dtype=np.bool_)
+
+
 def planar_placements(x: FloatArray, y: FloatArray, theta: FloatArray) -> FloatArray:
     """Poses (n, 7) of what stands on the ground, of its x, y [m] and heading [rad], each (n,)."""
     zero = np.zeros_like(x)
@@ -132,8 +137,7 @@ def _frames(recorded: Recorded, leader: str, follower: str) -> Iterator[_Stream]
     nowhere = np.full((len(recorded.t_ns), 7), np.nan)
     led = nowhere if recorded.leader is None else recorded.leader
     follows = nowhere if recorded.follower is None else recorded.follower
-    first: NDArray[np.bool_] = np.isfinite(led).all(axis=1)
-    second: NDArray[np.bool_] = np.isfinite(follows).all(axis=1)
+    first, second = known_rows(led), known_rows(follows)
     for names, rows, values in (
         ((leader, follower), np.flatnonzero(first & second), np.hstack([led, follows])),
         ((leader,), np.flatnonzero(first & ~second), led),
@@ -188,7 +192,7 @@ def _stream(
 ) -> _Stream:
     """Messages of the rows of ``values``, all of them finite unless ``rows`` says which."""
     if rows is None:
-        rows = np.flatnonzero(np.isfinite(values).all(axis=1))
+        rows = np.flatnonzero(known_rows(values))
     marks = [_MARK * (1.0 + k / 64.0) for k in range(values.shape[1])]
     pattern = make(marks, _NUMBER)
     payload = encode(pattern)

@@ -7,6 +7,7 @@ columns.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -28,6 +29,7 @@ _MATRIX = tuple(f"Rot[{k}]" for k in range(9))
 _ANGLES = ("Roll", "Pitch", "Yaw")
 _TABS = Layout("\t", ".")
 _HEADING_LINES = 60
+_KEY = re.compile(r"[A-Z][A-Z0-9_]{3,}")
 
 
 class _Body(NamedTuple):
@@ -75,10 +77,10 @@ def _heading(source: str, text: Text) -> tuple[dict[str, list[str]], int]:
     about: dict[str, list[str]] = {}
     for k, line in enumerate(text.lines[:_HEADING_LINES]):
         key, *values = (cell.strip() for cell in line.split("\t"))
-        if {"X", "Y", "Z"} & set(values) or key.endswith(" X"):
-            return about, k
-        if key.isupper():
+        if _KEY.fullmatch(key):
             about[key] = values
+        elif {"X", "Y", "Z"} & {key, *values} or key.endswith(" X"):
+            return about, k
     kind = about.get("DATA_INCLUDED", ["other"])[0]
     raise UsageError(f"{source}: holds {kind} data without columns X, Y, Z; export 6DOF data with its header")
 
