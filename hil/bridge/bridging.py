@@ -33,7 +33,7 @@ class Bridge(Protocol):
 
 
 def run_bridge(
-    make_bridge: Callable[[], Bridge],
+    make_bridge: Callable[[Wire], Bridge],
     scenario: Scenario,
     endpoints: Endpoints,
     ending: Ending,
@@ -42,12 +42,12 @@ def run_bridge(
 ) -> None:
     """Publish what a bridge brings until the end is asked for or ``duration_s`` is over.
 
-    The bridge is made once the wire is there. Topics lie where the scenario has them.
+    The bridge is made once the wire is there, and is given it. Topics lie where the scenario has them.
     """
     session = open_session(endpoints, give_up=lambda: ending.asked)
     wire = Wire(session, layout=layout_of(scenario))
     try:
-        bridge = make_bridge()
+        bridge = make_bridge(wire)
         try:
             on_ready()
             until = None if duration_s is None else time.monotonic() + duration_s

@@ -64,7 +64,53 @@ def bridge_natnet(
         connect = DEFAULT_ENDPOINT
     endpoints = Endpoints(connect, listen, zenoh_config)
     run_bridge(
-        lambda: NatNetBridge(place, wire, _say),
+        lambda _: NatNetBridge(place, wire, _say),
+        chosen,
+        endpoints,
+        ending,
+        duration,
+        lambda: _say(f"ready, {chosen.name} on {endpoints.describe()}"),
+    )
+
+
+@command.command("ros2")
+@click.argument("scenario", default="turtlebot3")
+@click.option("--connect", metavar="ENDPOINT", help=f"Router to connect to [{DEFAULT_ENDPOINT}].")
+@click.option("--listen", metavar="ENDPOINT", help="Be the router, at this endpoint.")
+@click.option("--zenoh-config", type=_CONFIG, help="Zenoh config file, in place of both.")
+@click.option("--duration", type=DURATION, help="End after S seconds.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key.")
+@click.option("--tethered", is_flag=True, hidden=True)
+def bridge_ros2(
+    scenario: str,
+    connect: str | None,
+    listen: str | None,
+    zenoh_config: Path | None,
+    duration: float | None,
+    overrides: tuple[str, ...],
+    tethered: bool,
+) -> None:
+    """Join a ROS 2 network by rclpy: motion capture and odometry of SCENARIO in, commands out."""
+    with collector_paused():
+        from hil.bridge.bridging import run_bridge
+        from hil.bridge.ros_bridge import RosBridge
+        from hil.bridge.ros_graph import RosGraph, require_ros
+        from hil.bridge.ros_routes import routes_of
+        from hil.live.daemon import Ending
+        from hil.wire.session import Endpoints
+
+    ending = Ending()
+    ending.on_signals()
+    if tethered:
+        ending.on_parent_gone()
+    chosen = load_scenario(scenario, overrides)
+    routes, domain = routes_of(chosen), chosen.wire.domain or None
+    require_ros(routes)
+    if not (connect or listen or zenoh_config):
+        connect = DEFAULT_ENDPOINT
+    endpoints = Endpoints(connect, listen, zenoh_config)
+    run_bridge(
+        lambda wire: RosBridge(wire, routes, lambda hear: RosGraph("abreast", domain, routes, hear), _say),
         chosen,
         endpoints,
         ending,

@@ -128,17 +128,24 @@ def daemon_command(name: str, summary: str) -> click.Command:
 
 
 def _emulator(order: Order) -> Worker:
+    from hil.emulator.foreign_mocap import ForeignMocapNode
     from hil.emulator.node import EmulatorNode
     from hil.live.node_worker import NodeWorker
+    from hil.wire import topics
+    from hil.wire.source_topics import converts
 
     node = EmulatorNode(order.scenario, order.needs)
-    if not order.natnet.natnet:
-        return NodeWorker([node], on_report=_on_report())
-    from hil.bridge.natnet_emulator import NatNetEmulator
+    if order.natnet.natnet:
+        from hil.bridge.natnet_emulator import NatNetEmulator
 
-    emulator = NatNetEmulator(node, order.natnet.serving(), on_report=_on_report())
-    click.echo(f"abreast emulator: serves {served(emulator, order.natnet.natnet_address)}", err=True)
-    return emulator
+        emulator = NatNetEmulator(node, order.natnet.serving(), on_report=_on_report())
+        click.echo(f"abreast emulator: serves {served(emulator, order.natnet.natnet_address)}", err=True)
+        return emulator
+    if not converts(order.scenario):
+        return NodeWorker([node], on_report=_on_report())
+    frames = (topics.RIGID_BODIES,)
+    foreign = ForeignMocapNode(order.scenario)
+    return NodeWorker([node, foreign], within=frames, on_report=_on_report(), unspoken=frames)
 
 
 def _serve_alone(order: Order, ending: Ending, duration_s: float | None) -> None:
@@ -153,9 +160,14 @@ def _serve_alone(order: Order, ending: Ending, duration_s: float | None) -> None
 
 def _estimator(order: Order) -> Worker:
     from hil.live.node_worker import NodeWorker
-    from hil.nodes.link_nodes import estimator_node
+    from hil.nodes.link_nodes import estimator_node, frames_within, source_nodes
 
-    return NodeWorker([estimator_node(link) for link in order.links], on_report=_on_report())
+    source = source_nodes(order.links, order.scenario)
+    return NodeWorker(
+        [*source, *map(estimator_node, order.links)],
+        within=frames_within(source),
+        on_report=_on_report(),
+    )
 
 
 def _controller(order: Order) -> Worker:
@@ -173,12 +185,13 @@ def _controller(order: Order) -> Worker:
 
 def _follower(order: Order) -> Worker:
     from hil.live.node_worker import NodeWorker
-    from hil.nodes.link_nodes import controller_node, estimator_node
+    from hil.nodes.link_nodes import controller_node, estimator_node, frames_within, source_nodes
 
     controllers = [controller_node(link) for link in order.links]
+    source = source_nodes(order.links, order.scenario)
     return NodeWorker(
-        [*map(estimator_node, order.links), *controllers],
-        within=[node.topics.estimate for node in controllers],
+        [*source, *map(estimator_node, order.links), *controllers],
+        within=[*frames_within(source), *(node.topics.estimate for node in controllers)],
         parting=_parting("follower", order),
         after_tick=remarks_on({node.law for node in controllers}),
         on_report=_on_report(),

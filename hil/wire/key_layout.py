@@ -22,9 +22,13 @@ class KeyLayout:
     prefix: str = ""
     names: Mapping[str, str] = field(default_factory=dict)
 
+    def name(self, topic: str) -> str:
+        """What a topic is called in ROS, without the leading slash."""
+        return self.names.get(topic, topic)
+
     def key(self, topic: str) -> str:
         """Key expression of a topic."""
-        name = self.names.get(topic, topic)
+        name = self.name(topic)
         return f"{self.prefix}/{name}" if self.prefix else name
 
 
