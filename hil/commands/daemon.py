@@ -96,6 +96,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
             ending,
             duration,
             say_ready,
+            name,
         )
         if dropped:
             click.echo(f"abreast {name}: {dropped} messages came too fast and were dropped", err=True)

@@ -104,7 +104,7 @@ class _Supervisor:
         self._pairs = [link_topics(link) for link in links]
         self._nodes = [name for daemon in daemons for name in node_names(daemon, links)]
         self._session = open_session(Endpoints(connect=endpoint))
-        self._wire = Wire(self._session, urgent_topics(scenario), layout_of(scenario))
+        self._wire = Wire(self._session, urgent_topics(scenario), layout_of(scenario), "run")
         self._monitor = RunMonitor(self._session, self._pairs, layout_of(scenario))
         self._children = Children(log_path.parent)
         extra = {

@@ -96,9 +96,9 @@ class RunMonitor:
     def __init__(self, session: zenoh.Session, pairs: Sequence[Topics], layout: KeyLayout = OURS) -> None:
         self.snapshot = Snapshot(tuple(pair.follower for pair in pairs))
         self._updated_at = time.monotonic()
-        self._diagnostics = session.declare_subscriber(layout.key(topics.DIAGNOSTICS), self._on_diagnostics)
+        self._diagnostics = session.declare_subscriber(layout.heard(topics.DIAGNOSTICS), self._on_diagnostics)
         self._newest = {
-            topic: session.declare_subscriber(layout.key(topic), zenoh.handlers.RingChannel(1))
+            topic: session.declare_subscriber(layout.heard(topic), zenoh.handlers.RingChannel(1))
             for pair in pairs
             for topic in (pair.estimate, pair.certified, pair.command, pair.truth)
         }
