@@ -11,7 +11,7 @@ import click
 
 from formation.collector import collector_paused
 from hil.commands.own_parts import load_own_parts, remarks_on
-from hil.commands.seconds import DURATION
+from hil.commands.seconds import DURATION, Seconds
 from hil.errors import UsageError
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario
@@ -30,13 +30,16 @@ class Order:
     """What a daemon is started for.
 
     ``links``: the followers that it serves, if it serves any. ``out``: the recorder's log.
-    ``needs``: the daemons that the emulator waits for.
+    ``needs``: the daemons that emulator or leader wait for. ``countdown_s``: from then on to when the leader
+    sets off; ``by_hand``: somebody else drives it.
     """
 
     scenario: Scenario
     links: tuple[Link, ...]
     out: Path | None
     needs: frozenset[str]
+    countdown_s: float = 0.0
+    by_hand: bool = False
 
 
 def daemon_command(name: str, summary: str) -> click.Command:
@@ -54,6 +57,8 @@ def daemon_command(name: str, summary: str) -> click.Command:
         followers: tuple[str, ...] = (),
         tethered: bool = False,
         certify: bool = False,
+        countdown: float = 0.0,
+        by_hand: bool = False,
     ) -> None:
         # Wire and messages take a third of a second to load, which help needs not.
         with collector_paused():
@@ -73,7 +78,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
             load_own_parts(chosen, estimates=name != "controller")
         needed = frozenset(filter(None, needs.split(",")))
         links = tuple(link_of(chosen, name) for name in dict.fromkeys(followers)) or links_of(chosen)
-        order = Order(chosen, links, out, needed)
+        order = Order(chosen, links, out, needed, countdown, by_hand)
         endpoints = Endpoints(connect, listen, zenoh_config)
 
         def say_ready() -> None:
@@ -110,12 +115,38 @@ def daemon_command(name: str, summary: str) -> click.Command:
     if name in ("follower", "estimator"):
         what = "Publish a guaranteed error radius of every estimate."
         options.append(click.Option(["--certify"], is_flag=True, help=what))
-    if name == "emulator":
+    if name == "leader":
+        options += _leader_options()
+    if name in ("emulator", "leader"):
         needs = "Daemons that must be well before the leader sets off, by commas."
         options.append(
             click.Option(["--needs"], default="estimator,controller", show_default=True, help=needs)
         )
     return click.Command(name, callback=callback, params=options, help=f"Run {summary}.")
+
+
+def _leader_options() -> list[click.Parameter]:
+    from hil.nodes.leader_driver import COUNTDOWN_S
+
+    count = "Seconds from when all are well to when the leader sets off."
+    hand = "Drive nobody: tell only when the leader sets off, whoever drives it."
+    return [
+        click.Option(["--countdown"], type=Seconds(0.0), default=COUNTDOWN_S, show_default=True, help=count),
+        click.Option(["--by-hand"], is_flag=True, help=hand),
+    ]
+
+
+def _leader(order: Order) -> Worker:
+    from hil.live.node_worker import NodeWorker, Parting
+    from hil.nodes.leader_driver import LeaderDriver
+    from hil.nodes.leader_watch import LeaderWatch
+    from hil.nodes.link_nodes import leader_standstill
+
+    if order.by_hand:
+        return NodeWorker([LeaderWatch(order.scenario, order.needs)], on_report=_on_report())
+    driver = LeaderDriver(order.scenario, order.needs, order.countdown_s)
+    parting = Parting("the leader ended", lambda now_ns: [leader_standstill(order.scenario, now_ns)])
+    return NodeWorker([driver], parting=parting, on_report=_on_report())
 
 
 def _emulator(order: Order) -> Worker:
@@ -183,6 +214,7 @@ def _recorder(order: Order) -> Worker:
 
 _WORKERS: dict[str, Callable[[Order], Worker]] = {
     "emulator": _emulator,
+    "leader": _leader,
     "follower": _follower,
     "estimator": _estimator,
     "controller": _controller,
