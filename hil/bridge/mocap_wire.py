@@ -15,7 +15,6 @@ from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 
-NAME = "bridge"
 _PERIOD_NS = 500_000_000
 
 
@@ -28,18 +27,19 @@ def wanted_bodies(scenario: Scenario) -> tuple[str, ...]:
 class MocapWire:
     """Makes frames messages by the names, axes and topic of a scenario, and reports twice a second.
 
-    ``up``: which of the capture's axes points up, None for the one of the scenario's ``source.up``. Messages
-    have that of ``source.up`` in any case, as that is what whoever hears them expects. ``say``: takes lines
-    for the console, each once when it begins to be so. Raises :class:`UsageError` where the scenario has
-    its motion capture in other messages.
+    ``name``: of the bridge in diagnostics. ``up``: which of the capture's axes points up, None for the one
+    of the scenario's ``source.up``. Messages have that of ``source.up`` in any case, as that is what whoever
+    hears them expects. ``say``: takes lines for the console, each once when it begins to be so. Raises
+    :class:`UsageError` where the scenario has its motion capture in other messages.
     """
 
-    def __init__(self, scenario: Scenario, up: Up | None, say: Callable[[str], None]) -> None:
+    def __init__(self, name: str, scenario: Scenario, up: Up | None, say: Callable[[str], None]) -> None:
         if scenario.source.type != "RigidBodies":
             raise UsageError(
                 f"source.type = {scenario.source.type!r}: the bridge publishes RigidBodies; "
                 "leave source.type out, or leave out the bridge"
             )
+        self._name = name
         self._wire_up: Up = scenario.source.up
         self._up: Up = up or scenario.source.up
         self.watch = BodyWatch(wanted_bodies(scenario), self._up)
@@ -68,10 +68,10 @@ class MocapWire:
         state = waiting or self.watch.state(now_ns)
         findings = self.watch.findings(now_ns)
         self.say(state)
-        self._findings.note(NAME, {name: text for name, text in findings.items() if name != "bodies"})
+        self._findings.note(self._name, {name: text for name, text in findings.items() if name != "bodies"})
         problem = state if state.startswith("waiting") else "; ".join(findings)
         told = {**values, **self.watch.values(now_ns)}
-        return outgoing(topics.DIAGNOSTICS, diagnostics(NAME, now_ns, problem, told), now_ns)
+        return outgoing(topics.DIAGNOSTICS, diagnostics(self._name, now_ns, problem, told), now_ns)
 
     def say(self, state: str) -> None:
         """Say on the console how things are, unless that is what was said last."""

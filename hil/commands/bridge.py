@@ -59,7 +59,7 @@ def bridge_natnet(
         ending.on_parent_gone()
     chosen = load_scenario(scenario, overrides)
     place = Server(*address_of(server, COMMAND_PORT), multicast)
-    wire = MocapWire(chosen, up, _say)
+    wire = MocapWire("bridge/natnet", chosen, up, _say)
     if not (connect or listen or zenoh_config):
         connect = DEFAULT_ENDPOINT
     endpoints = Endpoints(connect, listen, zenoh_config)
