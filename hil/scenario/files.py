@@ -36,8 +36,8 @@ def load_scenario(name_or_path: str, overrides: Overrides = ()) -> Scenario:
     """Read a scenario by its shipped name or from a TOML file, then apply ``section.key=value`` overrides.
 
     A file with a ``base``, the name of a scenario or a path to one from where the file is, says only what
-    differs from that. Raises :class:`UsageError` for an unknown name, unreadable TOML, an unknown key (naming the nearest known
-    one), a wrong type, or a value out of range.
+    differs from that. Raises :class:`UsageError` for an unknown name, unreadable TOML, an unknown key (naming
+    the nearest known one), a wrong type, or a value out of range.
     """
     path = locate("scenario", _FOLDER, name_or_path)
     tree = _with_base(path, ())
