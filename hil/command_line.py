@@ -26,11 +26,12 @@ COMMANDS = {
     "follower": "estimator and controller in one process, as a daemon",
     "estimator": "the estimator, as a daemon",
     "controller": "the controller, as a daemon",
+    "leader": "what drives a real leader by its program, as a daemon",
     "recorder": "the recorder, as a daemon",
     "bridge": "motion captures of others brought to the wire, as a daemon",
 }
 _MODULES = {"import": "import_recording"}
-_DAEMONS = ("emulator", "follower", "estimator", "controller", "recorder")
+_DAEMONS = ("emulator", "follower", "estimator", "controller", "leader", "recorder")
 
 
 class _LazyGroup(click.Group):

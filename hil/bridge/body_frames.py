@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hil.bridge.seen_frame import SeenBody, SeenFrame
-from hil.bridge.up_axis import Up, turned_orientation, turned_position
-from hil.nodes.node import Outgoing, outgoing
+from hil.bridge.up_axis import Up
+from hil.scenario.lab import SourceSection
 from hil.wire import message_types as msg
-from hil.wire import topics
 from hil.wire.messages import header
+from hil.wire.pose_sources import laid, pose_of, upright
+from hil.wire.records import Placement
 
 FRAME_ID = "mocap"
 _NO_ORIENTATION = (0.0, 0.0, 0.0, 0.0)
@@ -27,24 +28,21 @@ def known_as(bodies: Sequence[SeenBody], wanted: Sequence[str]) -> list[str]:
     ]
 
 
-def frame_message(frame: SeenFrame, names: Sequence[str], given: Up, wanted: Up) -> Outgoing:
+def frame_message(
+    frame: SeenFrame, names: Sequence[str], given: Up, source: SourceSection
+) -> msg.RigidBodies:
     """The frame under its capture time, with those of its bodies that were seen.
 
-    One without an orientation gets zeros for it. ``names``: of all its bodies. ``given``,
-    ``wanted``: which axis points up before and after.
+    One without an orientation gets zeros for it. ``names``: of all its bodies. ``given``: which axis points
+    up; ``source``: the axes and the unit that whoever hears the message expects.
     """
     bodies = [
-        msg.RigidBody(name, [], _pose(body, given, wanted))
+        msg.RigidBody(name, [], pose_of(laid(upright(_place(body), given, 1.0), source.up, source.scale)))
         for name, body in zip(names, frame.bodies, strict=True)
         if body.placed
     ]
-    number = frame.number % 2**32
-    message = msg.RigidBodies(header(frame.capture_ns, FRAME_ID), number, bodies)
-    return outgoing(topics.RIGID_BODIES, message, frame.capture_ns)
+    return msg.RigidBodies(header(frame.capture_ns, FRAME_ID), frame.number % 2**32, bodies)
 
 
-def _pose(body: SeenBody, given: Up, wanted: Up) -> msg.Pose:
-    x, y, z = turned_position(body.position, given, wanted)
-    orientation = body.orientation if body.turned else _NO_ORIENTATION
-    qx, qy, qz, qw = turned_orientation(orientation, given, wanted)
-    return msg.Pose(position=msg.Point(x=x, y=y, z=z), orientation=msg.Quaternion(x=qx, y=qy, z=qz, w=qw))
+def _place(body: SeenBody) -> Placement:
+    return Placement(*body.position, *(body.orientation if body.turned else _NO_ORIENTATION))

@@ -45,7 +45,7 @@ def run_bridge(
     The bridge is made once the wire is there, and is given it. Topics lie where the scenario has them.
     """
     session = open_session(endpoints, give_up=lambda: ending.asked)
-    wire = Wire(session, layout=layout_of(scenario))
+    wire = Wire(session, layout=layout_of(scenario), node="bridge")
     try:
         bridge = make_bridge(wire)
         try:

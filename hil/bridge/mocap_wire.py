@@ -11,17 +11,11 @@ from hil.bridge.up_axis import Up
 from hil.errors import UsageError
 from hil.live.finding_lines import FindingLines
 from hil.nodes.node import Outgoing, diagnostics, is_due, outgoing
-from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
 from hil.wire import topics
+from hil.wire.source_topics import all_bodies, source_topics
 
 _PERIOD_NS = 500_000_000
-
-
-def wanted_bodies(scenario: Scenario) -> tuple[str, ...]:
-    """What the motion capture calls the scenario's robots, the leader first."""
-    links = links_of(scenario)
-    return (links[0].bodies[0], *(link.bodies[1] for link in links))
 
 
 class MocapWire:
@@ -40,9 +34,10 @@ class MocapWire:
                 "leave source.type out, or leave out the bridge"
             )
         self._name = name
-        self._wire_up: Up = scenario.source.up
+        self._source = scenario.source
+        self._topic = next(iter(source_topics(scenario)), topics.RIGID_BODIES)
         self._up: Up = up or scenario.source.up
-        self.watch = BodyWatch(wanted_bodies(scenario), self._up)
+        self.watch = BodyWatch(all_bodies(scenario), self._up)
         self._say, self._said = say, ""
         self._findings = FindingLines(say)
         self._report_ns = 0
@@ -51,7 +46,7 @@ class MocapWire:
         """The message of a frame."""
         names = known_as(frame.bodies, self.watch.wanted)
         self.watch.see(frame, names)
-        return frame_message(frame, names, self._up, self._wire_up)
+        return outgoing(self._topic, frame_message(frame, names, self._up, self._source), frame.capture_ns)
 
     def report(self, now_ns: int, waiting: str, values: Mapping[str, object]) -> Iterator[Outgoing]:
         """Diagnostics, when they are due.

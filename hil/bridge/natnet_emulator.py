@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from hil.bridge.datagram_sockets import arrivals, open_socket, send
-from hil.bridge.mocap_wire import wanted_bodies
 from hil.bridge.natnet_frame import Body
 from hil.bridge.natnet_packets import VERSIONS, ServerInfo, Version
 from hil.bridge.natnet_service import FREQUENCY, NatNetService
@@ -23,6 +22,7 @@ from hil.wire import topics
 from hil.wire.events import TICK, Event
 from hil.wire.message_types import RigidBodies, RigidBody
 from hil.wire.messages import decode_as, to_ns
+from hil.wire.source_topics import all_bodies
 
 _MARKER_ERROR = 0.0002
 _UPTIME_NS = 86_400_000_000_000
@@ -74,7 +74,7 @@ class NatNetEmulator(NodeWorker):
             serving.data_port or _free_port(),
             serving.multicast,
         )
-        self.names = wanted_bodies(scenario)
+        self.names = all_bodies(scenario)
         self._service = NatNetService(self.info, self.names, scenario.mocap.rate_hz, self._reading_ns)
         self._lock, self._closed = threading.Lock(), threading.Event()
         self._thread = threading.Thread(target=self._answer, daemon=True)

@@ -1,4 +1,4 @@
-"""Which axis of a motion capture points up: poses turned accordingly, and what tracks tell of it."""
+"""Which axis of a motion capture points up, as far as tracks tell it."""
 
 from __future__ import annotations
 
@@ -6,25 +6,10 @@ from typing import Literal, NamedTuple
 
 Up = Literal["y", "z"]
 Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
 
 _TRAVEL = 0.3
 _CLIMB = 0.1
 _FLAT = 0.03
-
-
-def turned_position(position: Vector, given: Up, wanted: Up) -> Vector:
-    """A position whose axis ``given`` points up, by axes of which ``wanted`` does; x stays."""
-    x, y, z = position
-    if given == wanted:
-        return position
-    return (x, -z, y) if wanted == "z" else (x, z, -y)
-
-
-def turned_orientation(orientation: Quaternion, given: Up, wanted: Up) -> Quaternion:
-    """A quaternion x, y, z, w likewise. The body's own axes turn with it: forward stays forward."""
-    x, y, z, w = orientation
-    return (*turned_position((x, y, z), given, wanted), w)
 
 
 class Extent(NamedTuple):

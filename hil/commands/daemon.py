@@ -12,7 +12,7 @@ import click
 from formation.collector import collector_paused
 from hil.commands.natnet_options import NatNetOptions, natnet_options, served
 from hil.commands.own_parts import load_own_parts, remarks_on
-from hil.commands.seconds import DURATION
+from hil.commands.seconds import DURATION, Seconds
 from hil.errors import UsageError
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario
@@ -31,7 +31,8 @@ class Order:
     """What a daemon is started for.
 
     ``links``: the followers that it serves, if it serves any. ``out``: the recorder's log.
-    ``needs``: the daemons that the emulator waits for. ``natnet``: how it serves its frames by NatNet.
+    ``needs``: the daemons that emulator or leader wait for. ``natnet``: how the emulator serves its frames by
+    NatNet. ``countdown_s``: from then on to when the leader sets off; ``by_hand``: somebody else drives it.
     """
 
     scenario: Scenario
@@ -39,6 +40,8 @@ class Order:
     out: Path | None
     needs: frozenset[str]
     natnet: NatNetOptions
+    countdown_s: float = 0.0
+    by_hand: bool = False
 
 
 def daemon_command(name: str, summary: str) -> click.Command:
@@ -56,6 +59,8 @@ def daemon_command(name: str, summary: str) -> click.Command:
         followers: tuple[str, ...] = (),
         tethered: bool = False,
         certify: bool = False,
+        countdown: float = 0.0,
+        by_hand: bool = False,
         **natnet: Any,
     ) -> None:
         # Wire and messages take a third of a second to load, which help needs not.
@@ -78,7 +83,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
             load_own_parts(chosen, estimates=name != "controller")
         needed = frozenset(filter(None, needs.split(",")))
         links = tuple(link_of(chosen, name) for name in dict.fromkeys(followers)) or links_of(chosen)
-        order = Order(chosen, links, out, needed, options)
+        order = Order(chosen, links, out, needed, options, countdown, by_hand)
         if alone:
             _serve_alone(order, ending, duration)
             return
@@ -96,6 +101,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
             ending,
             duration,
             say_ready,
+            name,
         )
         if dropped:
             click.echo(f"abreast {name}: {dropped} messages came too fast and were dropped", err=True)
@@ -118,13 +124,40 @@ def daemon_command(name: str, summary: str) -> click.Command:
     if name in ("follower", "estimator"):
         what = "Publish a guaranteed error radius of every estimate."
         options.append(click.Option(["--certify"], is_flag=True, help=what))
-    if name == "emulator":
+    if name == "leader":
+        options += _leader_options()
+    if name in ("emulator", "leader"):
         needs = "Daemons that must be well before the leader sets off, by commas."
         options.append(
             click.Option(["--needs"], default="estimator,controller", show_default=True, help=needs)
         )
+    if name == "emulator":
         options += natnet_options()
     return click.Command(name, callback=callback, params=options, help=f"Run {summary}.")
+
+
+def _leader_options() -> list[click.Parameter]:
+    from hil.nodes.leader_driver import COUNTDOWN_S
+
+    count = "Seconds from when all are well to when the leader sets off."
+    hand = "Drive nobody: tell only when the leader sets off, whoever drives it."
+    return [
+        click.Option(["--countdown"], type=Seconds(0.0), default=COUNTDOWN_S, show_default=True, help=count),
+        click.Option(["--by-hand"], is_flag=True, help=hand),
+    ]
+
+
+def _leader(order: Order) -> Worker:
+    from hil.live.node_worker import NodeWorker, Parting
+    from hil.nodes.leader_driver import LeaderDriver
+    from hil.nodes.leader_watch import LeaderWatch
+    from hil.nodes.link_nodes import leader_standstill
+
+    if order.by_hand:
+        return NodeWorker([LeaderWatch(order.scenario, order.needs)], on_report=_on_report())
+    driver = LeaderDriver(order.scenario, order.needs, order.countdown_s)
+    parting = Parting("the leader ended", lambda now_ns: [leader_standstill(order.scenario, now_ns)])
+    return NodeWorker([driver], parting=parting, on_report=_on_report())
 
 
 def _emulator(order: Order) -> Worker:
@@ -222,6 +255,7 @@ def _recorder(order: Order) -> Worker:
 
 _WORKERS: dict[str, Callable[[Order], Worker]] = {
     "emulator": _emulator,
+    "leader": _leader,
     "follower": _follower,
     "estimator": _estimator,
     "controller": _controller,

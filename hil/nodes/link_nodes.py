@@ -9,7 +9,7 @@ from formation.pose import STANDSTILL
 from hil.nodes.controller import ControllerNode
 from hil.nodes.node import Outgoing, outgoing
 from hil.nodes.source import SourceNode
-from hil.scenario.links import Link
+from hil.scenario.links import Link, links_of
 from hil.scenario.schema import Scenario
 from hil.wire.drive_message import drive_message
 from hil.wire.source_topics import converts
@@ -50,3 +50,10 @@ def standstill(link: Link, now_ns: int) -> Outgoing:
     pair = link_topics(link)
     still = drive_message(STANDSTILL, now_ns, pair.follower, stamped=pair.stamped)
     return outgoing(pair.cmd_vel, still, now_ns)
+
+
+def leader_standstill(scenario: Scenario, now_ns: int) -> Outgoing:
+    """What makes the first robot stand, without its driver."""
+    pair = link_topics(links_of(scenario)[0])
+    still = drive_message(STANDSTILL, now_ns, pair.leader, stamped=pair.stamped)
+    return outgoing(pair.leader_cmd_vel, still, now_ns)

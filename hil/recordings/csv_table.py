@@ -27,7 +27,7 @@ from hil.recordings.delimited import (
 from hil.recordings.known_columns import bracketed
 from hil.recordings.pair_log import Times
 from hil.recordings.text_file import Text
-from hil.recordings.time_column import read_times
+from hil.recordings.time_column import later, read_times
 from hil.recordings.units import factor_of, is_unit
 
 _DAMAGED_SHARE = 0.1
@@ -136,15 +136,10 @@ class _Reader:
         scale = Decimal(str(source.factor("t", told_unit(self.heading, "t", source))))
         cells = texts(self.cells.columns[source.column])
         found = read_times(cells, scale, Decimal(str(source.offset)), self.heading.layout.decimal)
-        for row, (cell, t_ns) in enumerate(zip(cells, found.t_ns, strict=True)):
-            if t_ns is None:
-                self._fault(
-                    row,
-                    source,
-                    f"{cell!r}, expected a time from 0 to 2038" if cell else "empty, expected a time",
-                )
-        t = np.array([-1 if t_ns is None else t_ns for t_ns in found.t_ns], dtype=np.int64)
-        return t, found.kind
+        for row in np.flatnonzero(found.t_ns < 0).tolist():
+            shown = repr(cells[row]) if cells[row] else "empty"
+            self._fault(row, source, f"{shown}, expected a time from 0 to 2038")
+        return found.t_ns, found.kind
 
     def values(self, sources: Mapping[str, Source]) -> dict[str, FloatArray]:
         found: dict[str, FloatArray] = {}
@@ -185,23 +180,18 @@ class _Reader:
 
     def kept(self, t_ns: Times) -> Times:
         """Rows that are some: undamaged, each later than all before it."""
-        lines = self.cells.lines.tolist()
-        rows = [row for row, line in enumerate(lines) if line not in self.damaged]
-        kept: list[int] = []
-        times = t_ns.tolist()
-        newest = -1
-        for row in rows:
-            if times[row] > newest:
-                newest = times[row]
-                kept.append(row)
-                continue
-            fault = "repeats that" if times[row] == newest else "runs backwards from the one"
+        rows = np.flatnonzero(~np.isin(self.cells.lines, list(self.damaged)))
+        times = t_ns[rows]
+        good = later(times)
+        for k in np.flatnonzero(~good).tolist():
+            newest = int(times[:k].max())
+            fault = "repeats that" if times[k] == newest else "runs backwards from the one"
             self._fault(
-                row,
+                int(rows[k]),
                 self.chart.columns["t"],
-                f"time {times[row] * 1e-9:.9g} s {fault} of the row before ({newest * 1e-9:.9g} s)",
+                f"time {times[k] * 1e-9:.9g} s {fault} of the row before ({newest * 1e-9:.9g} s)",
             )
-        return np.array(kept, dtype=np.int64)
+        return rows[good]
 
     def refuse_another_file(self) -> None:
         """Raise :class:`UsageError` if too much of the file is no table as the map says."""

@@ -14,7 +14,7 @@ from hil.errors import UsageError
 from hil.recordings.delimited import Layout, find_layout, is_cut, numbers, read_cells, split_line, texts
 from hil.recordings.pair_log import Times
 from hil.recordings.text_file import Text
-from hil.recordings.time_column import read_times
+from hil.recordings.time_column import later, read_times
 
 _NS = 1_000_000_000
 _DAMAGED_SHARE = 0.1
@@ -66,7 +66,7 @@ def read_export(
         t_ns = np.array([round(k * period_s * _NS) for k in range(len(lines))], dtype=np.int64)
     else:
         times = read_times(texts(cells.columns[str(wanted[0])]), Decimal(1), Decimal(0), found.decimal)
-        t_ns = np.array([-1 if t is None else t for t in times.t_ns], dtype=np.int64)
+        t_ns = times.t_ns
     if not text.whole and (numbered[-1][0] in damaged or is_cut(numbered, found)):
         damaged[numbered[-1][0]] = "is cut off"
     kept = _increasing(t_ns, lines, damaged)
@@ -82,17 +82,13 @@ def _width(width: int, some: Sequence[Sequence[str]]) -> int:
 
 
 def _increasing(t_ns: Times, lines: Sequence[int], damaged: dict[int, str]) -> Times:
-    kept: list[int] = []
-    newest = -1
-    for row, t in enumerate(t_ns.tolist()):
-        if lines[row] in damaged:
-            continue
-        if t > newest:
-            newest = t
-            kept.append(row)
-        else:
-            damaged[lines[row]] = "has no time" if t < 0 else "has a time not after that of the row before"
-    return np.array(kept, dtype=np.int64)
+    """Rows that are no damaged ones, each later than all before it."""
+    rows = np.flatnonzero(~np.isin(lines, list(damaged))) if damaged else np.arange(len(lines))
+    good = later(t_ns[rows])
+    for row in rows[~good].tolist():
+        wrong = "has no time" if t_ns[row] < 0 else "has a time not after that of the row before"
+        damaged[lines[row]] = wrong
+    return rows[good]
 
 
 def _refuse_another_file(path: Path, damaged: dict[int, str], count: int) -> None:

@@ -32,6 +32,7 @@ TRUTH = (
 """What is told of the true states, in the order of the columns of :attr:`Recorded.truth`."""
 
 _NS_PER_S = 1_000_000_000
+_CHUNK_S = 2.0  # nothing is lost with an import that is ended: it can be done again
 _AT_ONCE = 4096  # rows whose messages are made together: a few megabytes
 _MARK = 1e300
 _NUMBER = 0x5EAFA11
@@ -74,7 +75,7 @@ def write_pair(out: Path, recorded: Recorded, scenario: Scenario, source: Mappin
         certificate_json(certificate_of(scenario, driven=False))
     )
     metadata["source"] = dict(source)
-    with DescribedLog(out, metadata) as log:
+    with DescribedLog(out, metadata, _CHUNK_S) as log:
         try:
             for topic, typename, payload, t_ns in _in_order(recorded, _streams(recorded, scenario)):
                 log.write(topic, typename, payload, t_ns, t_ns)

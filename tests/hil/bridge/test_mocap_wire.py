@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hil.bridge.mocap_wire import MocapWire, wanted_bodies
+from hil.bridge.mocap_wire import MocapWire
 from hil.bridge.seen_frame import SeenBody, SeenFrame
 from hil.bridge.up_axis import Up
 from hil.errors import UsageError
@@ -15,6 +15,7 @@ from hil.nodes.node import Outgoing
 from hil.scenario.files import load_scenario
 from hil.wire.message_types import DiagnosticArray, RigidBodies
 from hil.wire.messages import decode_as
+from hil.wire.source_topics import all_bodies
 
 MS = 1_000_000
 S = 1_000_000_000
@@ -50,7 +51,7 @@ def body(name: str, number: str = "9", *, tracked: bool = True, x: float = 0.0, 
 
 def test_all_robots_of_a_chain_are_wanted_by_what_the_motion_capture_calls_them() -> None:
     chain = load_scenario("chain5-turtlebot3", ['leader.body="1"', 'chain.bodies=["c","d","e"]'])
-    assert wanted_bodies(chain) == ("1", chain.follower.name, "c", "d", "e")
+    assert all_bodies(chain) == ("1", chain.follower.name, "c", "d", "e")
 
 
 def test_it_reports_twice_a_second_and_says_what_has_changed() -> None:
@@ -107,6 +108,14 @@ def test_messages_have_the_axes_that_the_scenario_takes_them_to_have(
     (told,) = lab.see(SeenBody("leader", "1", (1.0, 2.0, 3.0), UPRIGHT)).rigidbodies
     at = told.pose.position
     assert (at.x, at.y, at.z) == expected
+
+
+@pytest.mark.parametrize(
+    ("changes", "topic"), [((), "rigid_bodies"), (("source.up=y",), "source/rigid_bodies")]
+)
+def test_frames_go_where_the_scenario_hears_its_source(changes: tuple[str, ...], topic: str) -> None:
+    frame = SeenFrame(1, T0, T0, (SeenBody("leader", "1", (1.0, 2.0, 3.0), UPRIGHT),))
+    assert Lab(*changes).wire.publish(frame).topic == topic
 
 
 def test_a_wrong_axis_is_found_along_the_track_and_named_once() -> None:
