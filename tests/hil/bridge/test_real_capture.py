@@ -15,6 +15,7 @@ from hil.bridge.natnet_frame import Frame, read_frame
 from hil.bridge.natnet_model import read_model
 from hil.bridge.natnet_packets import Kind, ServerInfo, Version, opened, read_echo, read_echo_request
 from hil.bridge.server_clock import ServerClock
+from hil.nodes.node import Outgoing
 from hil.scenario.files import load_scenario
 from hil.wire import topics
 from hil.wire.message_types import DiagnosticArray, RigidBodies
@@ -90,7 +91,8 @@ def test_played_over_loopback_all_of_it_arrives_with_the_times_of_exposure(datag
         wire = MocapWire("bridge/natnet", scenario, None, said.append)
         bridge = NatNetBridge(Server("127.0.0.1", port), wire, said.append)
         try:
-            out, until = [], time.monotonic() + PATIENCE
+            out: list[Outgoing] = []
+            until = time.monotonic() + PATIENCE
             while time.monotonic() < until and sum(each.topic == topics.RIGID_BODIES for each in out) < 518:
                 bridge.wait(0.05)
                 out += bridge.take(time.time_ns())
