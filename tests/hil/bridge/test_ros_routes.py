@@ -1,13 +1,18 @@
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 
 import pytest
+import zenoh
 
 from hil.bridge.ros_graph import message_class
 from hil.bridge.ros_routes import Route, routes_of
 from hil.errors import UsageError
 from hil.scenario.files import load_scenario
+
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def routes(*settings: str, scenario: str = "turtlebot3") -> dict[str, Route]:
@@ -53,10 +58,21 @@ def test_a_message_package_that_is_not_there_is_named() -> None:
         message_class("no_such_msgs/msg/Thing")
 
 
+def test_the_bridge_of_the_lab_guide_carries_what_its_two_robots_need() -> None:
+    """Zenoh takes its configuration, and each list has every topic of its way, and no more."""
+    text = (ROOT / "docs" / "lab.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```json5\n(.*?)```", text, re.DOTALL)
+    config = zenoh.Config.from_json5(block)
+    assert json.loads(config.get_json("mode")) == "client"
+    allowed = json.loads(config.get_json("plugins/ros2dds/allow"))
+    found = routes("leader.namespace=tb3_0", "follower.namespace=tb3_1")
+    needed = {way: {name for name in found if name.endswith(way)} for way in ("/odom", "/cmd_vel")}
+    assert {"/odom": set(allowed["publishers"]), "/cmd_vel": set(allowed["subscribers"])} == needed
+
+
 def test_the_ros_package_has_the_messages_that_we_send() -> None:
     """One source: its folder of messages is ours, and it builds every one."""
-    root = Path(__file__).resolve().parents[3]
-    package, ours = root / "ros" / "abreast_msgs", root / "hil" / "wire" / "msg" / "abreast_msgs"
+    package, ours = ROOT / "ros" / "abreast_msgs", ROOT / "hil" / "wire" / "msg" / "abreast_msgs"
     names = sorted(path.name for path in ours.glob("*.msg"))
     assert sorted(path.name for path in (package / "msg").iterdir()) == names
     assert all((package / "msg" / name).read_bytes() == (ours / name).read_bytes() for name in names)
