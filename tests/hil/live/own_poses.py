@@ -17,8 +17,8 @@ from hil.scenario.schema import Scenario
 def off_orbit(table: Path, scenario: Scenario, judged_from_s: float) -> tuple[float, float]:
     """RMS of rho [m] and alpha1 [rad] off the noise-free run that began when the leader did.
 
-    ``table``: rows of time [s], both poses, the leader's v and u, as :mod:`tests.hil.live.stranger_lab` leaves
-    them. Judged from so long after the start until the leader was stopped.
+    ``table``: rows of time [s], both poses, the leader's v and u, as
+    :mod:`tests.hil.live.stranger_lab` leaves them. Judged from so long after the start until the stop.
     """
     rows = np.loadtxt(table, delimiter=",")
     driving = np.flatnonzero(np.abs(rows[:, 7]) > 0.01)
