@@ -10,7 +10,7 @@ from abreast._scenarios import Own, text_of
 from formation.collector import collector_paused
 from hil.errors import CheckFailedError
 from hil.judge.replayed import ReplayChoice, replayed
-from hil.log import reader
+from hil.log.opened import opened_log
 from hil.log.reader import Log
 from hil.scenario.files import Overrides
 
@@ -19,9 +19,9 @@ LogLike = Log | str | os.PathLike[str]
 
 
 def read_log(log: str | os.PathLike[str]) -> Log:
-    """Open a log, ours or an MCAP file of ``ros2 bag``: check that it is whole, read all but its messages.
+    """Open a log, ours or a bag of ROS, file or folder: check that it is whole, read all but its messages.
 
-    Raises :class:`UsageError` if it is missing, not MCAP, cut off or damaged.
+    Raises :class:`UsageError` if it is missing, no such thing, cut off or damaged.
 
     >>> import abreast
     >>> scenario = abreast.load_scenario("turtlebot3", {"run.duration_s": 2.0})
@@ -30,7 +30,7 @@ def read_log(log: str | os.PathLike[str]) -> Log:
     >>> log.topics["truth"], log.messages == run.summary["log"]["messages"]
     ('abreast_msgs/msg/Truth', True)
     """
-    return reader.read_log(Path(log))
+    return opened_log(Path(log))
 
 
 def log_of(given: LogLike) -> Log:

@@ -28,6 +28,7 @@ COMMANDS = {
     "controller": "the controller, as a daemon",
     "leader": "what drives a real leader by its program, as a daemon",
     "recorder": "the recorder, as a daemon",
+    "bridge": "motion captures of others brought to the wire, as a daemon",
 }
 _MODULES = {"import": "import_recording"}
 _DAEMONS = ("emulator", "follower", "estimator", "controller", "leader", "recorder")

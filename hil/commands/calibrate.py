@@ -58,16 +58,16 @@ def command(
     --from and --to are seconds since the first sighting or, for the timing, the first odometry; for imported
     recordings the source's own time.
     """
-    from hil.log.reader import read_log
+    from hil.log.opened import opened_log
     from hil.replay.lab_calibration import calibration_of, calibration_of_foreign
     from hil.replay.topic_map import load_topic_map
 
     if from_s is not None and to_s is not None and to_s <= from_s:
         raise UsageError(f"--to {to_s:g}: expected more than --from {from_s:g}")
     if chart is not None:
-        found = calibration_of_foreign(read_log(log), load_topic_map(chart, None, follower), from_s, to_s)
+        found = calibration_of_foreign(opened_log(log), load_topic_map(chart, None, follower), from_s, to_s)
     else:
-        found = calibration_of(read_log(log), follower, from_s, to_s)
+        found = calibration_of(opened_log(log), follower, from_s, to_s)
     _say_timing(found)
     _say_odometry(found.odometry)
     if found.offsets is not None:

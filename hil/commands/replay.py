@@ -64,10 +64,10 @@ def command(
     --from and --to are seconds since the leader set off, for imported recordings the source's own time; the
     steps always begin where the log does.
     """
-    from hil.log.reader import read_log
+    from hil.log.opened import opened_log
 
     # First of all: what replays takes over a second to load, and to compile where that is still to be done.
-    given = read_log(log)
+    given = opened_log(log)
 
     from hil.judge.replay_verdict import print_fed, violated_bounds
     from hil.judge.replayed import ReplayChoice, chain_in, replayed

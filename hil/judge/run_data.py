@@ -257,7 +257,7 @@ def _side_of(log: Log, link: Link, logged: tuple[int, bytes]) -> tuple[int, Stri
 
 def _facts(log: Log) -> LogFacts:
     path = str(log.path).encode(errors="replace").decode()
-    return LogFacts(path, log.messages, log.path.stat().st_size)
+    return LogFacts(path, log.messages, log.size_bytes())
 
 
 def _zero_ns(log: Log, run_data: RunData) -> int:

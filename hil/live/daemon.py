@@ -98,20 +98,23 @@ def run_daemon(
     ending: Ending,
     duration_s: float | None = None,
     on_ready: Callable[[], None] = lambda: None,
+    name: str = "node",
 ) -> int:
     """Run a worker on the wire until the end is asked for or ``duration_s`` is over.
 
     The worker is made once the wire is there; ``on_ready`` is called when it is subscribed. Events are taken
     one at a time in order of arrival; ``now`` is the host clock when one is taken. Topics lie where the
-    scenario has them. Returns how many arrivals found the inbox full and were dropped.
+    scenario has them; ``name``: what the ROS graph calls the worker. Returns how many arrivals found the
+    inbox full and were dropped.
     """
     session = open_session(endpoints, give_up=lambda: ending.asked)
-    wire = Wire(session, urgent_topics(scenario), layout_of(scenario))
+    wire = Wire(session, urgent_topics(scenario), layout_of(scenario), name)
     try:
         ending.notify(wire.wake)
         worker = make_worker()
         worker.begin(time.time_ns())
-        wire.subscribe(worker.subscribes)
+        # Who takes down everything is not who a message is meant for.
+        wire.subscribe(worker.subscribes, shown=not worker.thorough)
         # What is loaded by now stays for good; walking it again would halt a live step for 100 ms and more.
         gc.freeze()
         on_ready()

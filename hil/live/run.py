@@ -105,7 +105,7 @@ class _Supervisor:
         pairs = [link_topics(link) for link in self._links]
         self._nodes = [name for daemon in crew.daemons for name in node_names(daemon, self._links)]
         self._session = open_session(meeting.ours)
-        self._wire = Wire(self._session, urgent_topics(scenario), layout_of(scenario))
+        self._wire = Wire(self._session, urgent_topics(scenario), layout_of(scenario), "run")
         wheels = [pair.odom for pair in pairs] if crew.real else []
         if crew.drives_leader:
             wheels.append(pairs[0].leader_odom)

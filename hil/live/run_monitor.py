@@ -122,9 +122,9 @@ class RunMonitor:
     ) -> None:
         self.snapshot = Snapshot(tuple(pair.follower for pair in pairs))
         self._updated_at = time.monotonic()
-        self._diagnostics = session.declare_subscriber(layout.key(topics.DIAGNOSTICS), self._on_diagnostics)
+        self._diagnostics = session.declare_subscriber(layout.heard(topics.DIAGNOSTICS), self._on_diagnostics)
         self._newest = {
-            topic: session.declare_subscriber(layout.key(topic), zenoh.handlers.RingChannel(1))
+            topic: session.declare_subscriber(layout.heard(topic), zenoh.handlers.RingChannel(1))
             for topic in (*wheels, *(topic for pair in pairs for topic in _told_of(pair)))
         }
         self._pairs, self._wheels = pairs, wheels

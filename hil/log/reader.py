@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
@@ -56,6 +56,10 @@ class Record:
     sequence: int
 
 
+Source = Callable[[Collection[str] | None, int | None, int | None], Iterator[Record]]
+"""Messages of topics (None: all) from one log time on, before another one, in the order of log time."""
+
+
 @dataclass(frozen=True, slots=True)
 class Log:
     """A whole log, by :func:`read_log`.
@@ -64,7 +68,8 @@ class Log:
     by topic. ``definitions``: ``ros2msg`` text by type name, where the log has one. ``messages``: how many
     there are, from ``start_ns`` to ``end_ns`` in log time (both None in a log without messages). ``counts``:
     how many by topic, where the log tells. ``channels``: topic and type name by channel id. ``chunks``: in
-    the order of their first messages, none in a log without an index.
+    the order of their first messages, none in a log without an index. ``source``: gives the messages of a log
+    that isn't one MCAP, by topics and log times as :meth:`records` is asked for them.
 
     >>> import abreast
     >>> scenario = abreast.load_scenario("turtlebot3", {"run.duration_s": 2.0})
@@ -86,6 +91,7 @@ class Log:
     channels: Mapping[int, tuple[str, str]]
     chunks: Sequence[ChunkPlace] = field(repr=False)
     counts: Mapping[str, int] = field(default_factory=dict)
+    source: Source | None = field(default=None, repr=False)
 
     def records(
         self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
@@ -97,6 +103,9 @@ class Log:
         """
         self.check_encodings(self.topics if topics is None else topics)
         if start_ns is not None and end_ns is not None and end_ns <= start_ns:
+            return
+        if self.source is not None:
+            yield from self.source(topics, start_ns, end_ns)
             return
         with reading(self.path) as stream:
             if self.chunks:
@@ -113,6 +122,11 @@ class Log:
                     message.publish_time,
                     message.sequence,
                 )
+
+    def size_bytes(self) -> int:
+        """Size of the log's file, or of all files in its folder."""
+        parts = self.path.iterdir() if self.path.is_dir() else (self.path,)
+        return sum(part.stat().st_size for part in parts)
 
     def check_encodings(self, topics: Collection[str]) -> None:
         """Raise :class:`UsageError` if one of the topics is not encoded as CDR."""
@@ -201,10 +215,10 @@ def read_log(path: Path) -> Log:
             chunks=tuple(summary.chunks) if summary is not None and indexed else (),
             counts=_by_topic(counts, channels),
         )
-    return replace(log, metadata={**_told_in_messages(log), **metadata})
+    return replace(log, metadata={**told_in_messages(log), **metadata})
 
 
-def _told_in_messages(log: Log) -> dict[str, dict[str, str]]:
+def told_in_messages(log: Log) -> dict[str, dict[str, str]]:
     """What the log says of itself on a topic; other tools that copy logs leave metadata behind."""
     said = log.records([LOG]) if LOG in log.topics else iter(())
     first = next(said, None)
@@ -226,9 +240,7 @@ def _by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> dic
 def check_mcap(path: Path) -> None:
     """Raise :class:`UsageError` unless the path is a file that begins as MCAP does."""
     if path.is_dir():
-        inside = sorted(path.glob("*.mcap"))
-        hint = f"give the file in it: {inside[0]}" if inside else "expected an MCAP file"
-        raise UsageError(f"log {path}: is a folder; {hint}")
+        raise UsageError(f"log {path}: is a folder; expected an MCAP file")
     try:
         with path.open("rb") as stream:
             start = stream.read(len(MAGIC))

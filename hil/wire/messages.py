@@ -100,6 +100,11 @@ def typestore_of(typename: str, text: str) -> Typestore:
     return _typestore() if typename in _typestore().fielddefs and rihs01(typename) == digest else store
 
 
+def known_types() -> Typestore:
+    """All types that are known without a definition: those of ROS 2, ours, and those of motion capture."""
+    return _typestore()
+
+
 @functools.cache
 def definition(typename: str) -> str:
     """Return the type's complete ``ros2msg`` text: its own definition, then those of all it depends on."""

@@ -102,7 +102,7 @@ def test_a_rosbag2_recording_is_read(tmp_path: Path, sample_messages: dict[str, 
     assert isinstance(log.decode(first), Odometry)
     decoded: Any = log.decode(second)
     assert (decoded.speed, list(decoded.ticks)) == (0.5, [5, -1])
-    with pytest.raises(UsageError, match="folder; give the file in it"):
+    with pytest.raises(UsageError, match="is a folder; expected an MCAP file"):
         read_log(tmp_path / "bag")
 
 
