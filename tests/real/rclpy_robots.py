@@ -7,9 +7,10 @@ and kept for ever: there is no timeout. `rclpy_robots.py CONFIG`, where CONFIG i
         {"namespace": "leader", "pose": [0.3, 0.0, 1.5], "type": "TwistStamped", "hand": null}, ...]}
 
 True poses go by UDP to the motion capture on that port, 120 times a second, and with ``"table": PATH`` into
-a CSV at the end: time [s], both poses, v and u of the first robot, of each capture. A robot with a ``hand`` {v,
-u_mean, u_amplitude, omega} is driven by it, from when a line comes on standard input. At its end, or that of
-standard input, the process prints one line of JSON: of each robot the commands heard, its pose and its speed.
+a CSV at the end: time [s], both poses, v and u of the first robot, of each capture. A robot with a ``hand``
+{v, u_mean, u_amplitude, omega} is driven by it, from when a line comes on standard input. At its end, or that
+of standard input, the process prints one line of JSON: of each robot the commands heard, its pose and its
+speed.
 """
 
 from __future__ import annotations
