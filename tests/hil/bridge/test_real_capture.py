@@ -15,6 +15,7 @@ from hil.bridge.natnet_frame import Frame, read_frame
 from hil.bridge.natnet_model import read_model
 from hil.bridge.natnet_packets import Kind, ServerInfo, Version, opened, read_echo, read_echo_request
 from hil.bridge.server_clock import ServerClock
+from hil.nodes.node import Outgoing
 from hil.scenario.files import load_scenario
 from hil.wire import topics
 from hil.wire.message_types import DiagnosticArray, RigidBodies
@@ -85,12 +86,13 @@ def test_times_are_those_that_were_measured_on_it(datagrams: list[Captured]) -> 
 
 def test_played_over_loopback_all_of_it_arrives_with_the_times_of_exposure(datagrams: list[Captured]) -> None:
     player, said = Player(datagrams), list[str]()
-    scenario = load_scenario("turtlebot3", ['leader.body="RaceQuad"', 'source.up="y"'])
+    scenario = load_scenario("turtlebot3", ['leader.body="RaceQuad"'])
     with playing(player) as port:
-        wire = MocapWire("bridge/natnet", scenario, None, said.append)
+        wire = MocapWire("bridge/natnet", scenario, "y", said.append)
         bridge = NatNetBridge(Server("127.0.0.1", port), wire, said.append)
         try:
-            out, until = [], time.monotonic() + PATIENCE
+            out: list[Outgoing] = []
+            until = time.monotonic() + PATIENCE
             while time.monotonic() < until and sum(each.topic == topics.RIGID_BODIES for each in out) < 518:
                 bridge.wait(0.05)
                 out += bridge.take(time.time_ns())
