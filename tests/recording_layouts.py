@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta, timezone
 from decimal import Decimal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -274,7 +275,8 @@ def _motive_body(layout: Motive, poses: Array) -> tuple[list[str], list[str], li
         axes = [*"XYZ"]
         turned = np.full((ROWS, 3), NAN)
         seen = np.isfinite(quaternions).all(axis=1)
-        angles = Rotation.from_quat(quaternions[seen]).as_euler(layout.rotation, degrees=True)
+        order: Any = layout.rotation
+        angles = Rotation.from_quat(quaternions[seen]).as_euler(order, degrees=True)
         turned[seen] = angles[:, [layout.rotation.index(axis) for axis in "XYZ"]]
     values = np.column_stack([turned, np.column_stack([x, y, z]) * scale])
     kinds = ["Rotation"] * len(axes) + ["Position"] * 3

@@ -5,12 +5,13 @@ from __future__ import annotations
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import Protocol
 
 from hil.bridge.ros_routes import Route
 from hil.live.finding_lines import FindingLines
-from hil.nodes.findings import Findings, named_findings
+from hil.nodes.findings import named_findings
+from hil.nodes.listeners import listener_findings
 from hil.nodes.node import Outgoing, diagnostics, is_due, outgoing
 from hil.wire import topics
 from hil.wire.pubsub import Wire
@@ -128,11 +129,10 @@ class RosBridge:
             if route.drives:
                 types = self._graph.listeners(route.topic)
                 values[f"listeners.{route.topic}"] = len(types)
-                for name, text in listening(route, types).items():
+                for name, text in listener_findings(route.name, route.typename, types).items():
                     found.setdefault(name, []).append(text)
-        findings = {name: "; ".join(texts) for name, texts in found.items()}
-        if now_ns - self._begun_ns < _PATIENCE_NS:
-            findings = {}
+        begun = now_ns - self._begun_ns >= _PATIENCE_NS
+        findings = {name: "; ".join(texts) for name, texts in found.items() if begun}
         problem = f"waiting for {', '.join(silent)}" if silent else ""
         self._say_waiting(problem)
         self._findings.note(NAME, findings)
@@ -143,15 +143,3 @@ class RosBridge:
         if problem != self._waits:
             self._say(problem or "hears all that it waited for")
             self._waits = problem
-
-
-def listening(route: Route, types: Sequence[str]) -> Findings:
-    """What is wrong with who listens to a robot's commands in ROS, by the types that they expect."""
-    wrong = sorted({kind for kind in types if kind != route.typename})
-    if wrong:
-        return {
-            "command_type": f"{route.name} is listened to as {', '.join(wrong)}, expected {route.typename}"
-        }
-    if not types:
-        return {"deaf_robot": f"nobody in ROS 2 listens to {route.name}, expected its robot to"}
-    return {}

@@ -21,7 +21,9 @@ from hil.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     from hil.live.daemon import Ending, Worker
+    from hil.live.listener_watch import ListenerWatch
     from hil.live.node_worker import Parting
+    from hil.wire.pubsub import Wire
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
@@ -65,7 +67,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
     ) -> None:
         # Wire and messages take a third of a second to load, which help needs not.
         with collector_paused():
-            from hil.live.daemon import Ending, run_daemon
+            from hil.live.daemon import Ending, Presence, run_daemon
             from hil.wire.messages import prepare
             from hil.wire.session import Endpoints
             from hil.wire.topics import types_of
@@ -101,7 +103,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
             ending,
             duration,
             say_ready,
-            name,
+            Presence(name, _watch_of(order) if name in ("follower", "controller") else None),
         )
         if dropped:
             click.echo(f"abreast {name}: {dropped} messages came too fast and were dropped", err=True)
@@ -236,6 +238,17 @@ def _on_report() -> Callable[[bytes], None]:
     from hil.live.finding_lines import FindingLines
 
     return FindingLines(lambda line: click.echo(line, err=True)).hear
+
+
+def _watch_of(order: Order) -> Callable[[Wire], ListenerWatch]:
+    """What watches who listens to the robots that are driven."""
+    from hil.live.listener_watch import Commanded, ListenerWatch
+    from hil.wire.key_layout import layout_of
+    from hil.wire.topics import link_topics
+
+    named = [(link.node_name("listeners"), link_topics(link)) for link in order.links]
+    robots = [Commanded(node, each.cmd_vel, each.odom) for node, each in named]
+    return lambda wire: ListenerWatch(wire, layout_of(order.scenario), robots, _on_report())
 
 
 def _parting(name: str, order: Order) -> Parting:

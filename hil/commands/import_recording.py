@@ -105,6 +105,8 @@ def _tell(recording: str, log: Path, done: Imported) -> None:
         f"go on with: abreast replay {log}",
         err=True,
     )
+    for doubt in done.doubts:
+        click.echo(f"! {doubt}", err=True)
     if done.damage:
         shown = "; ".join(done.damage[:_SHOWN])
         rest = f"; and {len(done.damage) - _SHOWN} more" if len(done.damage) > _SHOWN else ""

@@ -44,7 +44,7 @@ def import_columns(recording: Path, text: Text, chart: ColumnMap, out: Path) -> 
     scenario = chart.scenario if chart.path is not None else at_rate_of(recorded, chart.scenario)
     messages = write_pair(out, recorded, scenario, source)
     damage = (*text.damage, *(f"line {line} {fault}" for line, fault in table.damaged.items()))
-    return imported(recorded, messages, _taken_for(text, heading, table, chart), damage)
+    return imported(recorded, scenario, messages, _taken_for(text, heading, table, chart), damage)
 
 
 def _by_names(recording: Path, heading: Heading, chart: ColumnMap) -> ColumnMap:

@@ -9,6 +9,7 @@ import numpy as np
 
 from formation.angles import FloatArray
 from hil.recordings.pair_log import Recorded, Times, known_rows
+from hil.recordings.plausibility import doubts
 from hil.scenario.files import with_overrides
 from hil.scenario.schema import Scenario
 
@@ -20,7 +21,8 @@ class Imported:
     """Rows read, messages written, and the times [s] of the first and the last row.
 
     ``taken_for``: what the recording was taken for. ``gaps``: rows without it, of the leader, the follower,
-    its motion, where there are some. ``damage``: what was left out as it is damaged, a phrase each.
+    its motion, where there are some. ``doubts``: what does not look right. ``damage``: what was left out as
+    it is damaged, a phrase each.
     """
 
     rows: int
@@ -29,18 +31,30 @@ class Imported:
     to_s: float
     taken_for: str = ""
     gaps: dict[str, int] = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()
     damage: tuple[str, ...] = ()
 
 
-def imported(recorded: Recorded, messages: int, taken_for: str, damage: Sequence[str]) -> Imported:
-    """What an import of these rows gave."""
+def imported(
+    recorded: Recorded, scenario: Scenario, messages: int, taken_for: str, damage: Sequence[str]
+) -> Imported:
+    """What an import of these rows with this scenario gave."""
     gaps = {
         role: missing
         for role, values in (("leader", recorded.leader), ("follower", recorded.follower))
         if (missing := _missing(values))
     }
     from_s, to_s = recorded.t_ns[0] * _NS, recorded.t_ns[-1] * _NS
-    return Imported(len(recorded.t_ns), messages, float(from_s), float(to_s), taken_for, gaps, tuple(damage))
+    return Imported(
+        rows=len(recorded.t_ns),
+        messages=messages,
+        from_s=float(from_s),
+        to_s=float(to_s),
+        taken_for=taken_for,
+        gaps=gaps,
+        doubts=doubts(recorded, scenario),
+        damage=tuple(damage),
+    )
 
 
 def rate_of(t_ns: Times) -> float:

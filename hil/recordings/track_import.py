@@ -84,4 +84,4 @@ def import_export(
     messages = write_pair(out, recorded, scenario, told)
     facts = [*export.facts, f"{up} up", f"{rate_of(export.t_ns):.4g} Hz"]
     facts.append(f"leader {names[0]!r}, follower {names[1]!r} of {len(tracks)} bodies")
-    return imported(recorded, messages, "; ".join(facts), export.damage)
+    return imported(recorded, scenario, messages, "; ".join(facts), export.damage)

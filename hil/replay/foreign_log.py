@@ -3,122 +3,192 @@
 from __future__ import annotations
 
 import bisect
-import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
-import numpy as np
-from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__PointStamped as PointStamped
-from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__PoseStamped as PoseStamped
-
-from hil.emulator.lab_messages import odometry_frames
 from hil.errors import UsageError
 from hil.log.events import Timed
-from hil.log.reader import Log, Record
-from hil.replay.topic_map import TopicMap, needs_odometry
+from hil.log.reader import Log
+from hil.nodes.findings import Findings
+from hil.replay.foreign_clocks import Clocks, clock_finding, clocks_of
+from hil.replay.foreign_samples import InputSample, PoseSample, motion_samples, pose_samples, sighting_samples
+from hil.replay.pose_axes import axes_findings
+from hil.replay.topic_map import TopicMap
 from hil.scenario.links import bodies_of
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.events import Event
-from hil.wire.messages import MalformedPayloadError, decode, decode_as, encode, header, to_ns, typename_of
-from hil.wire.topics import topics_of
+from hil.wire.messages import encode, header
+from hil.wire.pose_sources import NamedPlace, pose_of
 
-_OTHER_CLOCK_NS = 1_000_000_000
-_FRAMES = (typename_of(msg.RigidBodies), "mocap_msgs/msg/RigidBodies")
-_POSES = (typename_of(PoseStamped), typename_of(msg.Odometry))
-_MOTIONS = (typename_of(msg.Odometry), typename_of(msg.TwistStamped))
-_SIGHTINGS = (typename_of(msg.RangeBearing), typename_of(PoseStamped), typename_of(PointStamped))
-_STAMPED = (PoseStamped, PointStamped, msg.Odometry, msg.TwistStamped, msg.RangeBearing)
-_UNKNOWN_COVARIANCE = np.zeros(36)
-# A quaternion of zeros stands for none.
-_NO_POSE = msg.Pose(
-    position=msg.Point(x=0.0, y=0.0, z=0.0), orientation=msg.Quaternion(x=0.0, y=0.0, z=0.0, w=0.0)
-)
+_TOGETHER = 2
+"""Bodies that make a frame."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Input:
-    """A message for the estimator, what time it speaks of, and when it was logged."""
+@dataclass(frozen=True, slots=True, eq=False)
+class ForeignInputs:
+    """Inputs of an estimator in log order, each at its log time, and what was found to be wrong with them."""
 
-    topic: str
-    message: msg.Message
-    stamp_ns: int
-    log_ns: int
-
-
-@dataclass(frozen=True, slots=True)
-class _SeenPose:
-    pose: msg.Pose
-    stamp_ns: int
-    log_ns: int
+    events: list[Timed]
+    found: Findings
 
 
 def foreign_events(log: Log, chart: TopicMap) -> list[Timed]:
-    """Inputs of an estimator of the map's scenario, in log order, each at its log time.
+    """Inputs of an estimator of the map's scenario; see :func:`foreign_inputs`."""
+    return foreign_inputs(log, chart).events
 
-    If the stamps run on another clock (ahead of the log, or more than a second behind it at best), all times
-    are shifted so that the freshest input has no age. Raises :class:`UsageError` if the log lacks a topic or
-    a body of the map, if a topic is of a type that cannot be used, or if no two poses make up a frame.
+
+def foreign_inputs(log: Log, chart: TopicMap) -> ForeignInputs:
+    """Inputs of an estimator of the map's scenario, in log order.
+
+    If all stamps run on another clock (ahead of the log, or more than a second behind it at best), log times
+    are shifted so that the freshest input has no age; a topic whose clock differs from those of the others
+    has its stamps shifted so. A stamp ahead of its neighbours by more than a second leaves its message out.
+    Raises :class:`UsageError` if the log lacks a topic or a body of the map, if a topic is of a type that
+    cannot be used, if the two bodies are told in different frames of reference, or if no two poses make up a
+    frame.
     """
-    frames: list[_Input] = []
-    if chart.topics.rigid_bodies is not None:
-        frames = _frames(log, chart)
-    elif chart.topics.leader_pose is not None:
-        frames = _paired_frames(log, chart)
-    inputs = [*frames, *_sightings(log, chart), *_motions(log, chart)]
-    inputs.sort(key=lambda each: each.log_ns)
-    age_ns = min(each.log_ns - each.stamp_ns for each in inputs)
-    shift_ns = 0 if 0 <= age_ns <= _OTHER_CLOCK_NS else age_ns
-    return [(Event(each.topic, encode(each.message)), each.log_ns - shift_ns) for each in inputs]
+    poses, inputs = _poses(log, chart), [*motion_samples(log, chart), *sighting_samples(log, chart)]
+    ages: dict[str, list[int]] = {}
+    for pose in poses:
+        ages.setdefault(pose.topic, []).append(pose.log_ns - pose.stamp_ns)
+    for each in inputs:
+        ages.setdefault(each.source, []).append(each.log_ns - each.stamp_ns)
+    clocks = clocks_of(ages)
+    wild = {topic: sum(clocks.is_wild(topic, age) for age in told) for topic, told in ages.items()}
+    frames = _frames(log, chart, _right_poses(poses, clocks))
+    made = sorted([*frames, *_right_inputs(inputs, clocks)], key=lambda each: each[2])
+    events = [(Event(topic, encode(message)), log_ns - clocks.log_shift) for topic, message, log_ns in made]
+    said = clock_finding(clocks, wild, {topic: len(told) for topic, told in ages.items()})
+    found = {**({"clock": said} if said else {}), **axes_findings(pose.places for pose in poses)}
+    return ForeignInputs(events, found)
 
 
-def _frames(log: Log, chart: TopicMap) -> list[_Input]:
-    """Mocap frames with the pair's bodies under the scenario's names."""
-    topic = _present(log, chart, chart.topics.rigid_bodies or "", _FRAMES)
-    leader, follower = bodies_of(chart.scenario)
-    names = {chart.leader: leader, chart.follower: follower}
-    frames: list[_Input] = []
-    seen: set[str] = set()
-    for record in log.records([topic]):
-        try:
-            # By our definition, not the log's: the older package has the same layout under another name.
-            frame = decode_as(record.payload, msg.RigidBodies)
-            stamp_ns = _stamp_ns(record, frame.header, chart)
-        except MalformedPayloadError:
+_Made = tuple[str, msg.Message, int]
+"""Topic, message and log time [ns] of an input."""
+
+
+def _right_poses(poses: Iterable[PoseSample], clocks: Clocks) -> list[PoseSample]:
+    return [
+        replace(each, stamp_ns=each.stamp_ns + clocks.shifts.get(each.topic, 0))
+        for each in poses
+        if not clocks.is_wild(each.topic, each.log_ns - each.stamp_ns)
+    ]
+
+
+def _right_inputs(inputs: Iterable[InputSample], clocks: Clocks) -> Iterable[_Made]:
+    for each in inputs:
+        if clocks.is_wild(each.source, each.log_ns - each.stamp_ns):
             continue
-        seen.update(body.rigid_body_name for body in frame.rigidbodies)
-        pair = [
-            replace(body, rigid_body_name=names[body.rigid_body_name])
-            for body in frame.rigidbodies
-            if body.rigid_body_name in names
-        ]
-        frame = replace(frame, header=header(stamp_ns, frame.header.frame_id), rigidbodies=pair)
-        frames.append(_Input(topics.RIGID_BODIES, frame, stamp_ns, record.log_ns))
+        message, shift = each.message, clocks.shifts.get(each.source, 0)
+        if shift:
+            head = header(each.stamp_ns + shift, message.header.frame_id)
+            message = replace(message, header=head)
+        yield each.topic, message, each.log_ns
+
+
+def _poses(log: Log, chart: TopicMap) -> list[PoseSample]:
+    """Poses of the pair, as they were logged, in one frame of reference."""
+    given = chart.topics
+    if given.rigid_bodies is not None:
+        poses = pose_samples(log, chart, given.rigid_bodies, named=True, body="")
+        _check_bodies(log, chart, {place.body for each in poses for place in each.places})
+    elif given.leader_pose is not None and given.follower_pose is not None:
+        poses = []
+        for name, body in ((given.leader_pose, chart.leader), (given.follower_pose, chart.follower)):
+            of_body = pose_samples(log, chart, name, named=False, body=body)
+            if not of_body:
+                of_body = _of_another_name(log, chart, name, body)
+            poses += of_body
+    else:
+        return []
+    _check_frames_of_reference(log, chart, poses)
+    return poses
+
+
+def _of_another_name(log: Log, chart: TopicMap, name: str, body: str) -> list[PoseSample]:
+    """Poses of a topic on which nobody has the name that was looked for, if there is but one other body."""
+    poses = pose_samples(log, chart, name, named=False, body="")
+    others = {place.body for each in poses for place in each.places}
+    if not poses:
+        raise UsageError(f"log {log.path}: topic {name!r} has no pose that can be read; correct the map")
+    if len(others) > 1:
+        raise UsageError(
+            f"log {log.path}: body {body!r} is not on topic {name!r}; expected under [bodies] of the map one "
+            f"of: {', '.join(sorted(others))}"
+        )
+    named = [tuple(place._replace(body=body) for place in each.places) for each in poses]
+    return [replace(each, places=places) for each, places in zip(poses, named, strict=True)]
+
+
+def _check_bodies(log: Log, chart: TopicMap, seen: Collection[str]) -> None:
     for role, name in (("leader", chart.leader), ("follower", chart.follower)):
         if name not in seen:
             there = ", ".join(sorted(seen)) or "none"
             raise UsageError(
-                f"log {log.path}: {role} {name!r} is not among the bodies on {topic!r}; "
-                f"give --{role} one of: {there}"
+                f"log {log.path}: {role} {name!r} is not among the bodies on "
+                f"{chart.topics.rigid_bodies!r}; give --{role} one of: {there}"
             )
-    return frames
 
 
-def _paired_frames(log: Log, chart: TopicMap) -> list[_Input]:
-    """Frames of the leader's poses, each with the follower's nearest in time, where that is near enough."""
-    leaders = _poses(log, chart, chart.topics.leader_pose or "")
-    followers = sorted(_poses(log, chart, chart.topics.follower_pose or ""), key=lambda seen: seen.stamp_ns)
-    stamps = [seen.stamp_ns for seen in followers]
-    frames: list[_Input] = []
-    gaps: list[int] = []
-    for number, leader in enumerate(leaders):
-        place = bisect.bisect_left(stamps, leader.stamp_ns)
-        follower = min(
-            followers[max(0, place - 1) : place + 1], key=lambda seen: abs(seen.stamp_ns - leader.stamp_ns)
+def _check_frames_of_reference(log: Log, chart: TopicMap, poses: Iterable[PoseSample]) -> None:
+    """Refuse two bodies that are never told in one frame of reference; an empty frame_id says nothing."""
+    told: dict[str, set[str]] = {chart.leader: set(), chart.follower: set()}
+    for each in poses:
+        for place in each.places:
+            if place.body in told and place.frame_id:
+                told[place.body].add(place.frame_id)
+    of_leader, of_follower = told[chart.leader], told[chart.follower]
+    if of_leader and of_follower and not of_leader & of_follower:
+        raise UsageError(
+            f"log {log.path}: the leader's poses are in frame {_listed(of_leader)}, the follower's in "
+            f"{_listed(of_follower)}, which tells nothing of where they are to each other; expected topics "
+            "with poses in one frame_id, of a motion capture say; correct the map"
         )
-        gaps.append(abs(follower.stamp_ns - leader.stamp_ns))
+
+
+def _listed(names: Collection[str]) -> str:
+    return ", ".join(repr(name) for name in sorted(names))
+
+
+def _frames(log: Log, chart: TopicMap, poses: list[PoseSample]) -> list[_Made]:
+    """Mocap frames with the pair's bodies under the scenario's names."""
+    names = dict(zip((chart.leader, chart.follower), bodies_of(chart.scenario), strict=True))
+    if chart.topics.rigid_bodies is not None and _are_together(poses, names):
+        return [
+            _frame([p for p in each.places if p.body in names], names, each.stamp_ns, each.log_ns, number)
+            for number, each in enumerate(poses)
+        ]
+    return _paired(log, chart, poses, names) if poses else []
+
+
+def _are_together(poses: Iterable[PoseSample], names: Mapping[str, str]) -> bool:
+    """Whether messages hold both bodies, as frames do, and transforms may or may not."""
+    return any(sum(place.body in names for place in each.places) >= _TOGETHER for each in poses)
+
+
+def _paired(log: Log, chart: TopicMap, poses: Iterable[PoseSample], names: Mapping[str, str]) -> list[_Made]:
+    """Frames of the leader's poses, each with the follower's nearest in time, where that is near enough.
+
+    A frame is there once both are.
+    """
+    of: dict[str, list[tuple[NamedPlace, PoseSample]]] = {name: [] for name in names}
+    for each in poses:
+        for place in each.places:
+            if place.body in of:
+                of[place.body].append((place, each))
+    followers = sorted(of[chart.follower], key=lambda seen: seen[1].stamp_ns)
+    stamps = [sample.stamp_ns for _, sample in followers]
+    frames: list[_Made] = []
+    gaps: list[int] = []
+    for number, (leader, sample) in enumerate(of[chart.leader]):
+        at = bisect.bisect_left(stamps, sample.stamp_ns)
+        near = followers[max(0, at - 1) : at + 1]
+        follower, other = min(near, key=lambda seen: abs(seen[1].stamp_ns - sample.stamp_ns))
+        gaps.append(abs(other.stamp_ns - sample.stamp_ns))
         if gaps[-1] <= chart.topics.pair_within_s * 1e9:
-            frames.append(_pair(leader, follower, number, chart))
+            log_ns = max(sample.log_ns, other.log_ns)
+            frames.append(_frame([leader, follower], names, sample.stamp_ns, log_ns, number))
     if not frames:
         nearest = min(gaps) * 1e-9
         raise UsageError(
@@ -129,123 +199,8 @@ def _paired_frames(log: Log, chart: TopicMap) -> list[_Input]:
     return frames
 
 
-def _pair(leader: _SeenPose, follower: _SeenPose, number: int, chart: TopicMap) -> _Input:
-    """Frame of two poses. It is there once both are."""
-    names = bodies_of(chart.scenario)
-    bodies = [
-        msg.RigidBody(name, [], seen.pose) for name, seen in zip(names, (leader, follower), strict=True)
-    ]
-    frame = msg.RigidBodies(header(leader.stamp_ns, "world"), number, bodies)
-    return _Input(topics.RIGID_BODIES, frame, leader.stamp_ns, max(leader.log_ns, follower.log_ns))
-
-
-def _poses(log: Log, chart: TopicMap, name: str) -> list[_SeenPose]:
-    topic = _present(log, chart, name, _POSES)
-    poses: list[_SeenPose] = []
-    for record, message in _messages(log, topic, chart):
-        if isinstance(message, PoseStamped):
-            poses.append(_SeenPose(message.pose, _stamp_ns(record, message.header, chart), record.log_ns))
-        elif isinstance(message, msg.Odometry):
-            stamp_ns = _stamp_ns(record, message.header, chart)
-            poses.append(_SeenPose(message.pose.pose, stamp_ns, record.log_ns))
-    if not poses:
-        raise UsageError(f"log {log.path}: topic {topic!r} has no pose that can be read; correct the map")
-    return poses
-
-
-def _motions(log: Log, chart: TopicMap) -> list[_Input]:
-    name, own = chart.topics.odometry, topics_of(chart.scenario)
-    if name is None or (name not in _bare(log.topics) and not _is_missed(log, chart)):
-        return []
-    topic = _present(log, chart, name, _MOTIONS)
-    motions: list[_Input] = []
-    for record, message in _messages(log, topic, chart):
-        if isinstance(message, msg.Odometry):
-            pose, twist = message.pose.pose, message.twist
-        elif isinstance(message, msg.TwistStamped):
-            pose = _NO_POSE
-            twist = msg.TwistWithCovariance(twist=message.twist, covariance=_UNKNOWN_COVARIANCE)
-        else:
-            continue
-        stamp_ns = _stamp_ns(record, message.header, chart)
-        frame_id, child_frame_id = odometry_frames(own.follower)
-        odometry = msg.Odometry(
-            header=header(stamp_ns, frame_id),
-            child_frame_id=child_frame_id,
-            pose=msg.PoseWithCovariance(pose=pose, covariance=_UNKNOWN_COVARIANCE),
-            twist=twist,
-        )
-        motions.append(_Input(own.odom, odometry, stamp_ns, record.log_ns))
-    if not motions:
-        raise UsageError(f"log {log.path}: topic {topic!r} has no odometry that can be read; correct the map")
-    return motions
-
-
-def _is_missed(log: Log, chart: TopicMap) -> bool:
-    """Whether odometry that the log does not have is needed, or seems to be there under another name."""
-    poses = {chart.topics.leader_pose, chart.topics.follower_pose}
-    others = {name for name, typename in log.topics.items() if typename in _MOTIONS}
-    misnamed = chart.scenario.estimator.own_motion == "auto" and _bare(others) - poses
-    return needs_odometry(chart.scenario) or bool(misnamed)
-
-
-def _sightings(log: Log, chart: TopicMap) -> list[_Input]:
-    """The leader as the follower saw it, by range and bearing out of whatever tells its place."""
-    name, own = chart.topics.sighting, topics_of(chart.scenario)
-    if name is None:
-        return []
-    topic = _present(log, chart, name, _SIGHTINGS)
-    sightings: list[_Input] = []
-    for record, message in _messages(log, topic, chart):
-        if isinstance(message, msg.RangeBearing):
-            rho, alpha2 = message.rho, message.alpha2
-        elif isinstance(message, PoseStamped | PointStamped):
-            at = message.point if isinstance(message, PointStamped) else message.pose.position
-            rho, alpha2 = math.hypot(at.x, at.y), math.atan2(at.y, at.x)
-        else:
-            continue
-        stamp_ns = _stamp_ns(record, message.header, chart)
-        seen = msg.RangeBearing(header(stamp_ns, own.follower), rho, alpha2)
-        sightings.append(_Input(own.sighting, seen, stamp_ns, record.log_ns))
-    if not sightings:
-        raise UsageError(f"log {log.path}: topic {topic!r} has no sighting that can be read; correct the map")
-    return sightings
-
-
-def _messages(log: Log, topic: str, chart: TopicMap) -> Iterator[tuple[Record, msg.Message]]:
-    """Messages of a topic that can be decoded and have a stamp that is one."""
-    for record in log.records([topic]):
-        try:
-            told = chart.topics.types.get(topic.removeprefix("/"))
-            message = decode(record.payload, told) if told else log.decode(record)
-            if isinstance(message, _STAMPED):
-                to_ns(message.header.stamp)
-                yield record, message
-        except MalformedPayloadError:
-            continue
-
-
-def _stamp_ns(record: Record, given: msg.Header, chart: TopicMap) -> int:
-    return record.log_ns if chart.topics.stamps == "log" else to_ns(given.stamp)
-
-
-def _bare(names: Iterable[str]) -> set[str]:
-    return {name.removeprefix("/") for name in names}
-
-
-def _present(log: Log, chart: TopicMap, name: str, accepted: tuple[str, ...]) -> str:
-    """Name of a topic of the map as the log has it."""
-    for topic, typename in log.topics.items():
-        if topic.removeprefix("/") != name:
-            continue
-        typename = chart.topics.types.get(name, typename)
-        if typename not in accepted:
-            raise UsageError(
-                f"log {log.path}: topic {topic!r} is {typename}, expected {' or '.join(accepted)}; "
-                f"correct map {chart.path}"
-            )
-        return topic
-    there = ", ".join(sorted(log.topics)) or "none"
-    raise UsageError(
-        f"log {log.path}: topic {name!r} of map {chart.path} is not in the log; topics there: {there}"
-    )
+def _frame(
+    places: Iterable[NamedPlace], names: Mapping[str, str], stamp_ns: int, log_ns: int, number: int
+) -> _Made:
+    bodies = [msg.RigidBody(names[each.body], [], pose_of(each.place)) for each in places]
+    return topics.RIGID_BODIES, msg.RigidBodies(header(stamp_ns, "world"), number, bodies), log_ns

@@ -16,7 +16,7 @@ from hil.nodes.findings import Findings, all_found, findings_in
 from hil.nodes.link_nodes import controller_node, estimator_node
 from hil.nodes.node import Outgoing
 from hil.replay.feeding import why_edited
-from hil.replay.foreign_log import foreign_events
+from hil.replay.foreign_log import foreign_inputs
 from hil.replay.re_execution import (
     Execution,
     Parity,
@@ -142,11 +142,13 @@ def replay_fed(log: Log, link: Link, why: str) -> Replay:
 def replay_foreign(log: Log, chart: TopicMap) -> Replay:
     """Put another lab's log through the estimator of the scenario that its topic map leads to.
 
-    Raises :class:`UsageError` as :func:`hil.replay.foreign_log.foreign_events`.
+    Raises :class:`UsageError` as :func:`hil.replay.foreign_log.foreign_inputs`.
     """
     link = Link(chart.scenario)
     node = _estimator_of(link)
-    return _estimated_anew(link, node, execute(node, foreign_events(log, chart)))
+    inputs = foreign_inputs(log, chart)
+    played = _estimated_anew(link, node, execute(node, inputs.events))
+    return replace(played, found=all_found([played.found, {"log": inputs.found}]))
 
 
 def _why_edited(

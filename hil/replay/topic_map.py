@@ -9,7 +9,7 @@ name or ``{ topic, type }``. ``[bodies]`` names the two bodies in the frames.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,16 +20,20 @@ from hil.scenario.checked_toml import checked, locate, read_toml
 from hil.scenario.files import Overrides, merged_scenario, with_overrides
 from hil.scenario.links import refuse_chain
 from hil.scenario.schema import Scenario
-from hil.scenario.section import NonNegative
+from hil.scenario.section import NonNegative, Positive
 
 MAPS = "maps"
 
 
 class TypedTopic(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A topic, and the type by which it is read where the log has another name for that or none."""
+    """A topic and how it is read.
+
+    ``type``: where the log has another name for that or none. ``stamp``: ``receive`` takes the log's time.
+    """
 
     topic: str
-    type: str
+    type: str | None = None
+    stamp: Literal["header", "receive"] | None = None
 
 
 Entry = str | TypedTopic
@@ -38,12 +42,14 @@ Entry = str | TypedTopic
 class TopicNames(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Topics of a foreign log, with or without their leading slash.
 
-    ``rigid_bodies``: mocap frames, or ``leader_pose``, ``follower_pose``: PoseStamped or Odometry in one
-    world frame. ``odometry``: motion of the follower, Odometry or TwistStamped; without it the follower's own
-    poses tell its motion. ``sighting``: the leader as the follower sees it, our RangeBearing, or PoseStamped
-    or PointStamped of the leader in the follower's own frame (x ahead, y to the left); ``leader_sighting`` is
-    another name for it. ``stamps``: ``log`` takes the time of logging for the time of capture, where the
-    stamps of the sources come from different clocks.
+    ``rigid_bodies``: RigidBodies, NamedPoseArray, TFMessage or TransformStamped with both bodies by name, or
+    ``leader_pose``, ``follower_pose``: any of these, or PoseStamped, PoseWithCovarianceStamped or Odometry,
+    in one frame of reference. ``odometry``: motion of the follower, Odometry, TwistStamped, or Twist, as
+    commands are; without it the follower's own poses tell its motion. ``sighting``: the leader as the
+    follower sees it, our RangeBearing, or PoseStamped or PointStamped of the leader in the follower's own
+    frame (x ahead, y to the left); ``leader_sighting`` is another name for it. ``stamp``: ``receive`` takes
+    the time of logging for the time of capture, as is done with stamps of 0; ``stamps = "log"`` is the same.
+    ``up``: the axis of the poses that points up. ``scale``: what their unit of length is in metres.
     ``pair_within_s``: how far apart in time two poses may be to make a frame.
     """
 
@@ -54,6 +60,9 @@ class TopicNames(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     sighting: Entry | None = None
     leader_sighting: Entry | None = None
     stamps: Literal["header", "log"] = "header"
+    stamp: Literal["header", "receive"] | None = None
+    up: Literal["z", "y"] | None = None
+    scale: Positive | None = None
     pair_within_s: NonNegative = 0.002
 
 
@@ -72,16 +81,25 @@ class _File(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 @dataclass(frozen=True, slots=True)
 class MappedTopics:
-    """Topics of :class:`TopicNames` without leading slashes, and ``types`` that the map tells of them."""
+    """Topics of :class:`TopicNames` without leading slashes.
+
+    ``types``: that the map tells of them; ``received``: those whose stamps are the log's, all if None.
+    """
 
     odometry: str | None
     rigid_bodies: str | None
     leader_pose: str | None
     follower_pose: str | None
     sighting: str | None
-    stamps: Literal["header", "log"]
+    up: Literal["z", "y"]
+    scale: float
     pair_within_s: float
     types: Mapping[str, str]
+    received: frozenset[str] | None
+
+    def is_received(self, name: str) -> bool:
+        """Whether messages of a topic are taken to speak of when they were logged."""
+        return self.received is None or name in self.received
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +144,11 @@ def load_topic_map(
             f"{source}: topics.odometry is missing, and estimator.own_motion is "
             f"{scenario.estimator.own_motion!r}; name the topic, or set own_motion to 'auto' or 'mocap'"
         )
+    topics = replace(
+        topics,
+        up=file.topics.up or scenario.source.up,
+        scale=file.topics.scale or scenario.source.scale,
+    )
     refuse_chain(scenario, "a map names the topics of two robots; leave out what sets chain")
     return TopicMap(
         path=path,
@@ -170,6 +193,7 @@ def _check_sighted(topics: MappedTopics, scenario: Scenario, source: str) -> Non
 
 def _mapped(names: TopicNames) -> MappedTopics:
     types: dict[str, str] = {}
+    received: set[str] = set()
 
     def bare(entry: Entry | None) -> str | None:
         if entry is None:
@@ -177,17 +201,23 @@ def _mapped(names: TopicNames) -> MappedTopics:
         if isinstance(entry, str):
             return entry.removeprefix("/")
         name = entry.topic.removeprefix("/")
-        types[name] = entry.type
+        if entry.type is not None:
+            types[name] = entry.type
+        if entry.stamp == "receive":
+            received.add(name)
         return name
 
     sighting = names.sighting if names.sighting is not None else names.leader_sighting
+    of_log = names.stamp == "receive" or names.stamps == "log"
     return MappedTopics(
         odometry=bare(names.odometry),
         rigid_bodies=bare(names.rigid_bodies),
         leader_pose=bare(names.leader_pose),
         follower_pose=bare(names.follower_pose),
         sighting=bare(sighting),
-        stamps=names.stamps,
+        up=names.up or "z",
+        scale=names.scale or 1.0,
         pair_within_s=names.pair_within_s,
         types=types,
+        received=None if of_log else frozenset(received),
     )

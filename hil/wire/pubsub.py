@@ -14,7 +14,7 @@ import zenoh
 
 from hil.wire.events import TICK, Event
 from hil.wire.key_layout import OURS, KeyLayout
-from hil.wire.ros_tokens import Endpoint, endpoint_token, node_token
+from hil.wire.ros_tokens import Endpoint, all_tokens, endpoint_in, endpoint_token, node_token
 from hil.wire.topics import STOP
 
 INBOX_LIMIT = 100_000
@@ -81,6 +81,7 @@ class Wire:
         self._outlets: dict[str, _Outlet] = {}
         self._subscribers: list[zenoh.Subscriber[None]] = []
         self._tokens: list[zenoh.LivelinessToken] = []
+        self._graph: dict[str, Endpoint] = {}
         self._lock = threading.Lock()
         self._node = f"abreast_{node}" if node else ""
         if node:
@@ -112,6 +113,26 @@ class Wire:
         if outlet is None:
             outlet = self._declare(topic)
         outlet.put(payload)
+
+    def watch_graph(self) -> None:
+        """Begin to take down who publishes and who hears what, by everybody's tokens."""
+
+        def note(sample: zenoh.Sample) -> None:
+            token = str(sample.key_expr)
+            if sample.kind == zenoh.SampleKind.DELETE:
+                self._graph.pop(token, None)
+            elif (endpoint := endpoint_in(self._layout, token)) is not None:
+                self._graph[token] = endpoint
+
+        direct = zenoh.handlers.Callback(note, indirect=False)
+        watching = self._session.liveliness().declare_subscriber(
+            all_tokens(self._layout), direct, history=True
+        )
+        self._subscribers.append(watching)
+
+    def graph(self) -> tuple[Endpoint, ...]:
+        """Publishers and subscriptions of everybody, as far as they show in the ROS graph."""
+        return tuple(self._graph.copy().values())
 
     def wake(self) -> None:
         """Make a waiting :meth:`Inbox.take` return at once."""

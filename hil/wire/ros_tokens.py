@@ -42,8 +42,8 @@ def endpoint_token(layout: KeyLayout, number: int, topic: str, endpoint: Endpoin
     if layout.kind == "ros2dds":
         known = "" if layout.distro == "humble" else f":typehash={layout.type_hash(topic)};"
         quality = f":{int(reliable)}:0:0,{_DEPTH}{known}"
-        told = (endpoint.key.replace("/", "§"), endpoint.typename.replace("/", "§"), quality)
-        return f"@/{endpoint.session}/@ros2_lv/{kind}/{'/'.join(told)}"
+        key, typename = (each.replace("/", "§") for each in (endpoint.key, endpoint.typename))
+        return f"@/{endpoint.session}/@ros2_lv/{kind}/{key}/{typename}/{quality}"
     quality = f"{'' if reliable else 2}::,{_DEPTH}:,:,:,,"
     place = f"@ros2_lv/{layout.domain}/{endpoint.session}/0/{number}/{kind}/%/%/{endpoint.node}"
     name = f"%{layout.name(topic).replace('/', '%')}"

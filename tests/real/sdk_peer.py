@@ -27,7 +27,7 @@ def say(**told: Any) -> None:
 def hash_of(share: str, typename: str) -> str:
     """What the ROS packages say that the hash of a type is."""
     told = json.loads((Path(share) / f"{typename}.json").read_text(encoding="utf-8"))
-    return next(each["hash_string"] for each in told["type_hashes"] if each["type_name"] == typename)
+    return str(next(each["hash_string"] for each in told["type_hashes"] if each["type_name"] == typename))
 
 
 def main() -> None:

@@ -86,9 +86,9 @@ def test_times_are_those_that_were_measured_on_it(datagrams: list[Captured]) -> 
 
 def test_played_over_loopback_all_of_it_arrives_with_the_times_of_exposure(datagrams: list[Captured]) -> None:
     player, said = Player(datagrams), list[str]()
-    scenario = load_scenario("turtlebot3", ['leader.body="RaceQuad"', 'source.up="y"'])
+    scenario = load_scenario("turtlebot3", ['leader.body="RaceQuad"'])
     with playing(player) as port:
-        wire = MocapWire("bridge/natnet", scenario, None, said.append)
+        wire = MocapWire("bridge/natnet", scenario, "y", said.append)
         bridge = NatNetBridge(Server("127.0.0.1", port), wire, said.append)
         try:
             out: list[Outgoing] = []

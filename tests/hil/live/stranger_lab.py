@@ -74,7 +74,8 @@ def live(endpoint: str, table: Path, hand_after: float | None) -> None:
             if name == "follower" or hand_after is None:
                 robots[name].tell(twist.linear.x, twist.angular.z)
         if now >= hand_from:
-            robots["leader"].goal = tuple(program(now - hand_from))
+            motion = program(now - hand_from)
+            robots["leader"].goal = (motion.v, motion.u)
         if now < begun + number * FRAME_S:
             continue
         poses = [robot.pose for robot in robots.values()]

@@ -3,6 +3,7 @@ from __future__ import annotations
 from datetime import UTC, datetime, timedelta, timezone
 from decimal import Decimal
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -68,8 +69,6 @@ def test_what_is_no_date_of_ours_is_none(text: str) -> None:
 
 @given(st.lists(st.integers(-1, 20)))
 def test_later_ones_are_those_above_all_before(values: list[int]) -> None:
-    import numpy as np
-
     expected, newest = [], -1
     for value in values:
         expected.append(value > newest)

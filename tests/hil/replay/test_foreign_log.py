@@ -87,7 +87,8 @@ def lab(gap_ns: int = 0, stamps_ns: int = 0, frames: bool = False, as_odometry: 
             ("tb2", follower_at(later), stamp_ns + gap_ns),
         ):
             if as_odometry:
-                message: msg.Message = odometry_message(ns, body, pose, Motion(0.0, 0.0))
+                told = odometry_message(ns, body, pose, Motion(0.0, 0.0))
+                message: msg.Message = replace(told, header=header(ns, "map"))
             else:
                 message = PoseStamped(header=header(ns, "world"), pose=pose_message(pose))
             sent.append(Sent(f"/vrpn/{body}/pose", message, late_ns + gap_ns))
