@@ -61,7 +61,13 @@ def bridged(
     scenario: Scenario, port: int, count: int, said: list[str]
 ) -> tuple[list[RigidBodies], dict[str, str]]:
     """So many frames by the bridge, and what its last diagnostics tell."""
-    wire = MocapWire("bridge/natnet", scenario, None, said.append)
+    return published(MocapWire("bridge/natnet", scenario, None, said.append), port, count, said)
+
+
+def published(
+    wire: MocapWire, port: int, count: int, said: list[str]
+) -> tuple[list[RigidBodies], dict[str, str]]:
+    """The same by a wire of one's own."""
     bridge = NatNetBridge(Server("127.0.0.1", port), wire, said.append)
     out: list[Outgoing] = []
     until = time.monotonic() + PATIENCE
@@ -106,6 +112,20 @@ def test_frames_come_through_with_their_poses_and_times(version: Version, multic
     assert statistics.median(offsets) == pytest.approx(
         60_000.0, abs=1.0 + float(values["clock.round_trip_ms"])
     )
+
+
+def test_it_streams_y_up_where_the_scenario_has_it_so() -> None:
+    scenario = load_scenario("turtlebot3", ['source.up="y"'])
+    with emulator(scenario, VERSIONS[3]) as served:
+        wire = MocapWire("bridge/natnet", load_scenario("turtlebot3"), "y", lambda _: None)
+        frames, _ = published(wire, served.command_port, 20, [])
+    for frame in frames:
+        for body, origin in zip(
+            frame.rigidbodies, served.frames[frame.frame_number].rigidbodies, strict=True
+        ):
+            assert body.pose.position.x == pytest.approx(origin.pose.position.x, abs=1e-7)
+            assert body.pose.position.y == pytest.approx(origin.pose.position.y, abs=1e-7)
+            assert body.pose.orientation.z == pytest.approx(origin.pose.orientation.z, abs=1e-7)
 
 
 def test_alone_the_leader_drives_and_the_follower_stands() -> None:
