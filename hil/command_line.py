@@ -22,6 +22,8 @@ COMMANDS = {
     "import": "turn other recordings into logs",
     "calibrate": "find the offsets of a range and bearing sensor that mocap has watched",
     "recover": "make a cut-off log whole",
+    "status": "daemons, bodies and robots of a lab, live",
+    "stop": "stop all robots of a lab",
     "emulator": "the emulated robots and motion capture, as a daemon",
     "follower": "estimator and controller in one process, as a daemon",
     "estimator": "the estimator, as a daemon",

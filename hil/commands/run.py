@@ -181,7 +181,7 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> str:
     from rich.text import Text
 
     from hil.live.daemon import Ending
-    from hil.live.finding_lines import FindingLines
+    from hil.live.finding_lines import FindingLines, WaitingLines
     from hil.live.run import Meeting, run_live
     from hil.live.run_monitor import Snapshot
     from hil.wire.session import reserved_endpoint
@@ -196,6 +196,8 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> str:
             where = live.zenoh_config or endpoint
             console.print(Text(f"robots and bridges connect to {where}"), soft_wrap=True)
         lines = FindingLines(lambda line: console.print(Text(line), soft_wrap=True))
+        # Who does not watch a terminal is told as well, once for whatever is waited for.
+        waiting = WaitingLines(lambda line: console.is_terminal or console.print(Text(line), soft_wrap=True))
 
         def show(snapshot: Snapshot, elapsed: float | None) -> None:
             for node, findings in list(snapshot.findings.items()):
@@ -205,6 +207,7 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> str:
                 status.update(Text(snapshot.line(elapsed, scenario.run.duration_s)))
             elif live.crew.real and (waits := snapshot.waits_for(())):
                 status.update(Text(waits))
+                waiting.hear(waits)
 
         meeting = Meeting(endpoint, live.zenoh_config)
         try:

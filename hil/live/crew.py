@@ -7,13 +7,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from hil.scenario.links import Link
+from hil.scenario.links import STARTERS, Link
 
 FOLLOWERS_PER_PROCESS = {"follower": 32, "estimator": 4}
 """A process in Python keeps up with that many at 120 frames a second."""
-
-STARTERS = ("emulator", "leader")
-"""The daemons that let the leader set off, and so wait for all others."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

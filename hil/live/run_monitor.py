@@ -12,8 +12,8 @@ import zenoh
 
 from estimation.tracking.tracker import Status
 from formation.pose import Motion
-from hil.live.crew import STARTERS
 from hil.nodes.findings import Findings, findings_in
+from hil.scenario.links import STARTERS
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.key_layout import OURS, KeyLayout

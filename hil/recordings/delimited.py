@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from formation.angles import FloatArray
 
-COMMENTS = ("#", "%", "//")
 EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none", "nil", "-", "--", "-nan", "nan(ind)", "-nan(ind)"})
 """Cells that say that there is nothing, in lower case."""
 
 _DELIMITERS = "\t;,|"
 _SAMPLE = 40
+_COMMENT = re.compile(r'[ "]*(?:#|%|//)')
 _COMMA_NUMBER = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 
 
@@ -64,7 +64,7 @@ def split_line(line: str, delimiter: str) -> list[str]:
 
 def is_comment(line: str) -> bool:
     """Whether a line is a comment."""
-    return line.lstrip(' "').startswith(COMMENTS)
+    return _COMMENT.match(line) is not None
 
 
 def find_layout(lines: Sequence[str], delimiter: str | None = None, decimal: str | None = None) -> Layout:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,7 +29,7 @@ class _Trajectory(NamedTuple):
 
 def is_tum(text: Text) -> bool:
     """Whether a text looks like a trajectory: rows of eight numbers, without names, of a unit quaternion."""
-    some = [line for line in text.lines if line.strip() and not is_comment(line)][:20]
+    some = islice((line for line in text.lines if line.strip() and not is_comment(line)), 20)
     rows: list[list[float]] = []
     for line in some:
         try:

@@ -6,13 +6,16 @@ and kept for ever: there is no timeout. `rclpy_robots.py CONFIG`, where CONFIG i
     {"domain": 83, "poses_to": 27470, "duration_s": 60, "robots": [
         {"namespace": "leader", "pose": [0.3, 0.0, 1.5], "type": "TwistStamped", "hand": null}, ...]}
 
-True poses go by UDP to the motion capture on that port, 120 times a second. A robot with a ``hand`` {v,
-u_mean, u_amplitude, omega} is driven by it, from when a line comes on standard input. At its end, or that of
-standard input, the process prints one line of JSON: of each robot the commands heard, its pose and its speed.
+True poses go by UDP to the motion capture on that port, 120 times a second, and with ``"table": PATH`` into
+a CSV at the end: time [s], both poses, v and u of the first robot, of each capture. A robot with a ``hand``
+{v, u_mean, u_amplitude, omega} is driven by it, from when a line comes on standard input. At its end, or that
+of standard input, the process prints one line of JSON: of each robot the commands heard, its pose and its
+speed.
 """
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import select
@@ -96,6 +99,7 @@ def main() -> None:
     began = moved = told = time.time()
     driven_from: float | None = None
     captured = 0
+    rows: list[list[float]] = []
     print("ready", flush=True)
     while time.time() - began < given["duration_s"]:
         until = began + (captured + 1) / CAPTURES_HZ
@@ -112,10 +116,14 @@ def main() -> None:
         captured = int((now - began) * CAPTURES_HZ)
         poses = [number for robot in robots for number in robot.pose]
         mocap.sendto(struct.pack(f"<d{len(poses)}d", now, *poses), ("127.0.0.1", given["poses_to"]))
+        rows.append([now, *poses, *robots[0].speed])
         if now >= told + ODOMETRY_S:
             told += ODOMETRY_S
             for robot in robots:
                 robot.tell()
+    if "table" in given:
+        with open(given["table"], "w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows(rows)
     result = {
         robot.node.get_namespace(): {"heard": robot.heard, "pose": robot.pose, "speed": robot.speed}
         for robot in robots

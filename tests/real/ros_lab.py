@@ -128,7 +128,10 @@ HAND = {"v": 0.08, "u_mean": 0.2, "u_amplitude": 0.5, "omega": 1.570796326794896
 
 @dataclass(frozen=True, slots=True)
 class Lab:
-    """What stands in the lab. ``namespaces``, ``bodies``: of leader and follower. ``mocap``: its type."""
+    """What stands in the lab. ``namespaces``, ``bodies``: of leader and follower. ``mocap``: its type.
+
+    ``hand``: the leader drives by itself. ``table``: where the robots' own poses are left, if anywhere.
+    """
 
     domain: int
     namespaces: tuple[str, str] = ("leader", "follower")
@@ -139,6 +142,7 @@ class Lab:
     topic: str = "rigid_bodies"
     hand: bool = False
     duration_s: float = 120.0
+    table: str = ""
 
     def robots(self, poses_to: int) -> str:
         """Configuration of the robots."""
@@ -154,7 +158,8 @@ class Lab:
                 strict=True,
             )
         ]
-        return self._told(robots=told, poses_to=poses_to)
+        more = {"table": self.table} if self.table else {}
+        return self._told(robots=told, poses_to=poses_to, **more)
 
     def capture(self, poses_at: int) -> str:
         """Configuration of the motion capture."""

@@ -7,6 +7,7 @@ import math
 import re
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import pairwise
@@ -15,7 +16,12 @@ from typing import Any
 
 import pytest
 
-from tests.real.ros_lab import HERE
+from hil.wire import topics
+from hil.wire.message_types import RigidBodies
+from hil.wire.messages import decode_as
+from hil.wire.pubsub import Wire
+from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
+from tests.real.ros_lab import HERE, peer
 
 pytestmark = pytest.mark.slow
 
@@ -44,6 +50,19 @@ def emulator(version: str) -> Iterator[int]:
         process.terminate()
         _, rest = process.communicate(timeout=PATIENCE)
     assert (process.returncode, rest) == (0, "")
+
+
+@contextmanager
+def router() -> Iterator[tuple[str, Wire]]:
+    """A router on loopback, and an ear on it."""
+    with reserved_endpoint() as endpoint:
+        session = open_session(Endpoints(listen=endpoint))
+        wire = Wire(session)
+        try:
+            yield endpoint, wire
+        finally:
+            wire.close()
+            close_session(session)
 
 
 def read_by(python: Path, script: str, *arguments: str) -> dict[str, Any]:
@@ -93,3 +112,29 @@ def test_who_takes_the_first_answer_for_the_model_gets_it_every_time(version: st
         for _ in range(12):
             (frame,) = read_by(peers, "motioncapture_client.py", str(port), "1")["frames"]
             assert set(frame) == {FOLLOWER, LEADER}
+
+
+def test_our_bridge_through_motioncapture_publishes_what_it_reads(peers: Path) -> None:
+    with emulator("4.1") as port, router() as (endpoint, wire):
+        wire.subscribe([topics.RIGID_BODIES, topics.DIAGNOSTICS])
+        names = ["--set", f'leader.body="{LEADER}"', "--set", f'follower.body="{FOLLOWER}"']
+        asked = ["--type", "optitrack", "--server", f"127.0.0.1:{port}", "--connect", endpoint]
+        with peer("bridge", ["-m", "hil", "bridge", "mocap", *asked, *names], peers) as bridge:
+            bridge.wait_for("sees ")
+            frames = [decode_as(payload, RigidBodies) for payload in heard(wire, topics.RIGID_BODIES, 240)]
+    assert {tuple(sorted(body.rigid_body_name for body in frame.rigidbodies)) for frame in frames} == {
+        (FOLLOWER, LEADER)
+    }
+    numbers = [frame.frame_number for frame in frames]
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+
+
+def heard(wire: Wire, topic: str, count: int) -> list[bytes]:
+    """So many payloads on a topic."""
+    found: list[bytes] = []
+    until = time.monotonic() + PATIENCE
+    while len(found) < count and time.monotonic() < until:
+        event = wire.inbox.take(0.1)
+        if event is not None and event.topic == topic:
+            found.append(event.payload)
+    return found
