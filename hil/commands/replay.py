@@ -14,7 +14,9 @@ from hil.log.report_json import print_json, results_apart
 from hil.reports.judged_log import leave, made_folder
 
 if TYPE_CHECKING:
+    from hil.judge.replayed import Replayed
     from hil.judge.run_data import RunData
+    from hil.log.reader import Log
     from hil.scenario.schema import Scenario
 
 
@@ -89,7 +91,9 @@ def command(
         from hil.commands.chain_results import leave_replay
 
         _refuse_table(table, chain)
-        leave_replay(given, replayed(given, choice), out, as_json=as_json, verify=verify, strict=strict)
+        done = replayed(given, choice)
+        leave_replay(given, done, out, as_json=as_json, verify=verify, strict=strict)
+        _refuse_damage(given, done)
         return
     done = replayed(given, choice)
     (played,), (run_data,), summary = done.played, done.runs, done.summary
@@ -109,6 +113,13 @@ def command(
     if strict and (broken := violated_bounds(summary)):
         counts = ", ".join(f"{name} by {count}" for name, count in broken.items())
         raise CheckFailedError(f"log {log}: bounds violated (samples): {counts}")
+    _refuse_damage(given, done)
+
+
+def _refuse_damage(log: Log, done: Replayed) -> None:
+    """Fail for what is gone of a log, now that the rest has been told."""
+    if done.damage:
+        raise CheckFailedError(f"log {log.path}: {done.damage}")
 
 
 def _refuse_table(table: Path | None, chain: Scenario) -> None:
