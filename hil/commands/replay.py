@@ -10,7 +10,7 @@ import click
 from formation.collector import collector_paused
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
-from hil.log.report_json import print_json, results_apart
+from hil.log.report_json import print_json, print_text, results_apart
 from hil.reports.judged_log import leave, made_folder
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 @click.option("--leader", metavar="NAME", help="Name of the leader's body.")
 @click.option("--follower", metavar="NAME", help="Name of the follower's body.")
 @click.option("--map", "chart", metavar="FILE", help="Names the topics of a log that is not abreast's.")
+@click.option("--propose-map", "propose", is_flag=True, help="Print a map for LOG's topics, and no more.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key.")
 @click.option("--from", "from_s", type=Seconds(), metavar="S", help="Judge from here on.")
 @click.option("--to", "to_s", type=Seconds(), metavar="S", help="Judge up to here.")
@@ -52,6 +53,7 @@ def command(
     leader: str | None,
     follower: str | None,
     chart: str | None,
+    propose: bool,
     overrides: tuple[str, ...],
     from_s: float | None,
     to_s: float | None,
@@ -70,6 +72,11 @@ def command(
 
     # First of all: what replays takes over a second to load, and to compile where that is still to be done.
     given = opened_log(log)
+    if propose:
+        from hil.replay.proposed_map import proposed_map
+
+        print_text(proposed_map(given, leader, follower))
+        return
 
     from hil.judge.replay_verdict import print_fed, violated_bounds
     from hil.judge.replayed import ReplayChoice, chain_in, replayed
