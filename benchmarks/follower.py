@@ -35,7 +35,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from formation.pose import Motion, Pose, advance
 from hil.emulator.lab_messages import frame_message, odometry_message
-from hil.live.run import APART, TOGETHER, processes_of
+from hil.live.crew import APART, TOGETHER, processes_of
 from hil.scenario.files import load_scenario, scenario_text
 from hil.scenario.links import links_of
 from hil.wire import message_types as msg

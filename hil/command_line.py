@@ -22,14 +22,18 @@ COMMANDS = {
     "import": "turn other recordings into logs",
     "calibrate": "find the offsets of a range and bearing sensor that mocap has watched",
     "recover": "make a cut-off log whole",
+    "status": "daemons, bodies and robots of a lab, live",
+    "stop": "stop all robots of a lab",
     "emulator": "the emulated robots and motion capture, as a daemon",
     "follower": "estimator and controller in one process, as a daemon",
     "estimator": "the estimator, as a daemon",
     "controller": "the controller, as a daemon",
+    "leader": "what drives a real leader by its program, as a daemon",
     "recorder": "the recorder, as a daemon",
+    "bridge": "motion captures of others brought to the wire, as a daemon",
 }
 _MODULES = {"import": "import_recording"}
-_DAEMONS = ("emulator", "follower", "estimator", "controller", "recorder")
+_DAEMONS = ("emulator", "follower", "estimator", "controller", "leader", "recorder")
 
 
 class _LazyGroup(click.Group):

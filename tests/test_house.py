@@ -33,7 +33,7 @@ ROOMS = {
         "models", "own_motion", "time", "filters", "tracking", "bounds", "consistency", "calibration",
     ),
     "hil": (
-        "extensions", "scenario", "wire", "log", "nodes", "emulator", "lockstep", "live", "replay",
+        "extensions", "scenario", "wire", "log", "nodes", "emulator", "lockstep", "live", "bridge", "replay",
         "recordings", "judge", "figures", "reports", "sweep", "simulate", "commands",
     ),
 }  # fmt: skip

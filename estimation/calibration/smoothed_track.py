@@ -19,6 +19,9 @@ LONGEST_GAP_S = 0.1
 
 _STEP_S = 0.01
 
+_ONE_ANGLE = 0.98
+"""Length of the mean of unit vectors whose angles scatter by 0.2 rad."""
+
 
 @dataclass(frozen=True, slots=True)
 class LocalFit:
@@ -61,6 +64,47 @@ def smoothed_motion(
     rows[_unknown(times, wanted, LOCAL_FIT)] = np.nan
     rows[:, 2] = wrap(rows[:, 2])
     return SmoothedMotion(rows[:, :3], rows[:, 3:])
+
+
+def travelled_motion(
+    stamps_ns: NDArray[np.int64], poses: FloatArray, moments_ns: NDArray[np.int64], slowest: float
+) -> SmoothedMotion:
+    """The same of a body that travels: its heading is that of its travel, wherever its own axes point.
+
+    Who is faster than ``slowest`` [m/s] shows where it travels. Where that and the heading of the body, which
+    may be NaN, keep one angle, heading and turn rate are the body's, by that angle; elsewhere they are the
+    travel's, and held while it stands. Unknown of one that never travels.
+    """
+    start_ns = int(stamps_ns[0])
+    times, wanted = _seconds(stamps_ns, start_ns), _seconds(moments_ns, start_ns)
+    has_heading = bool(np.all(np.isfinite(poses[:, 2])))
+    told = poses if has_heading else np.column_stack([poses[:, :2], np.zeros(len(poses))])
+    grid, place, rate = _fitted(times, told, LOCAL_FIT)
+    speed = np.hypot(rate[:, 0], rate[:, 1])
+    if not np.any(speed > slowest):
+        unknown = np.full((len(wanted), 5), np.nan)
+        return SmoothedMotion(unknown[:, :3], unknown[:, 3:])
+    heading, turn = _travelled_heading(place, rate, speed > slowest, has_heading=has_heading)
+    forward = rate[:, 0] * np.cos(heading) + rate[:, 1] * np.sin(heading)
+    fitted = np.column_stack([place[:, :2], heading, forward, turn])
+    rows = np.column_stack([np.interp(wanted, grid, column) for column in fitted.T])
+    rows[_unknown(times, wanted, LOCAL_FIT)] = np.nan
+    rows[:, 2] = wrap(rows[:, 2])
+    return SmoothedMotion(rows[:, :3], rows[:, 3:])
+
+
+def _travelled_heading(
+    place: FloatArray, rate: FloatArray, moving: NDArray[np.bool_], *, has_heading: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Heading, unwrapped, and turn rate along a fitted track."""
+    travel = np.arctan2(rate[moving, 1], rate[moving, 0])
+    aside = np.mean(np.exp(1j * (travel - place[moving, 2])))
+    if has_heading and abs(aside) > _ONE_ANGLE:
+        return place[:, 2] + np.angle(aside), rate[:, 2]
+    rows = np.arange(len(place))
+    heading = np.interp(rows, rows[moving], np.unwrap(travel))
+    length = 2 * round(0.5 * WINDOW_S / _STEP_S) + 1
+    return heading, savgol_filter(heading, length, DEGREE, deriv=1, delta=_STEP_S)
 
 
 def fitted_rates(

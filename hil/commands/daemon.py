@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from formation.collector import collector_paused
+from hil.commands.natnet_options import NatNetOptions, natnet_options, served
 from hil.commands.own_parts import load_own_parts, remarks_on
-from hil.commands.seconds import DURATION
+from hil.commands.seconds import DURATION, Seconds
 from hil.errors import UsageError
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario
@@ -19,8 +20,10 @@ from hil.scenario.links import HOSTED, Link, link_of, links_of
 from hil.scenario.schema import Scenario
 
 if TYPE_CHECKING:
-    from hil.live.daemon import Worker
+    from hil.live.daemon import Ending, Worker
+    from hil.live.listener_watch import ListenerWatch
     from hil.live.node_worker import Parting
+    from hil.wire.pubsub import Wire
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
@@ -30,13 +33,17 @@ class Order:
     """What a daemon is started for.
 
     ``links``: the followers that it serves, if it serves any. ``out``: the recorder's log.
-    ``needs``: the daemons that the emulator waits for.
+    ``needs``: the daemons that emulator or leader wait for. ``natnet``: how the emulator serves its frames by
+    NatNet. ``countdown_s``: from then on to when the leader sets off; ``by_hand``: somebody else drives it.
     """
 
     scenario: Scenario
     links: tuple[Link, ...]
     out: Path | None
     needs: frozenset[str]
+    natnet: NatNetOptions
+    countdown_s: float = 0.0
+    by_hand: bool = False
 
 
 def daemon_command(name: str, summary: str) -> click.Command:
@@ -54,10 +61,13 @@ def daemon_command(name: str, summary: str) -> click.Command:
         followers: tuple[str, ...] = (),
         tethered: bool = False,
         certify: bool = False,
+        countdown: float = 0.0,
+        by_hand: bool = False,
+        **natnet: Any,
     ) -> None:
         # Wire and messages take a third of a second to load, which help needs not.
         with collector_paused():
-            from hil.live.daemon import Ending, run_daemon
+            from hil.live.daemon import Ending, Presence, run_daemon
             from hil.wire.messages import prepare
             from hil.wire.session import Endpoints
             from hil.wire.topics import types_of
@@ -66,6 +76,8 @@ def daemon_command(name: str, summary: str) -> click.Command:
         ending.on_signals()
         if tethered:
             ending.on_parent_gone()
+        options = NatNetOptions(**natnet)
+        alone = options.natnet and not (connect or listen or zenoh_config)
         if not (connect or listen or zenoh_config):
             connect = DEFAULT_ENDPOINT
         chosen = load_scenario(scenario, (*overrides, CERTIFY) if certify else overrides)
@@ -73,7 +85,10 @@ def daemon_command(name: str, summary: str) -> click.Command:
             load_own_parts(chosen, estimates=name != "controller")
         needed = frozenset(filter(None, needs.split(",")))
         links = tuple(link_of(chosen, name) for name in dict.fromkeys(followers)) or links_of(chosen)
-        order = Order(chosen, links, out, needed)
+        order = Order(chosen, links, out, needed, options, countdown, by_hand)
+        if alone:
+            _serve_alone(order, ending, duration)
+            return
         endpoints = Endpoints(connect, listen, zenoh_config)
 
         def say_ready() -> None:
@@ -88,6 +103,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
             ending,
             duration,
             say_ready,
+            Presence(name, _watch_of(order) if name in ("follower", "controller") else None),
         )
         if dropped:
             click.echo(f"abreast {name}: {dropped} messages came too fast and were dropped", err=True)
@@ -110,26 +126,83 @@ def daemon_command(name: str, summary: str) -> click.Command:
     if name in ("follower", "estimator"):
         what = "Publish a guaranteed error radius of every estimate."
         options.append(click.Option(["--certify"], is_flag=True, help=what))
-    if name == "emulator":
+    if name == "leader":
+        options += _leader_options()
+    if name in ("emulator", "leader"):
         needs = "Daemons that must be well before the leader sets off, by commas."
         options.append(
             click.Option(["--needs"], default="estimator,controller", show_default=True, help=needs)
         )
+    if name == "emulator":
+        options += natnet_options()
     return click.Command(name, callback=callback, params=options, help=f"Run {summary}.")
 
 
+def _leader_options() -> list[click.Parameter]:
+    from hil.nodes.leader_driver import COUNTDOWN_S
+
+    count = "Seconds from when all are well to when the leader sets off."
+    hand = "Drive nobody: tell only when the leader sets off, whoever drives it."
+    return [
+        click.Option(["--countdown"], type=Seconds(0.0), default=COUNTDOWN_S, show_default=True, help=count),
+        click.Option(["--by-hand"], is_flag=True, help=hand),
+    ]
+
+
+def _leader(order: Order) -> Worker:
+    from hil.live.node_worker import NodeWorker, Parting
+    from hil.nodes.leader_driver import LeaderDriver
+    from hil.nodes.leader_watch import LeaderWatch
+    from hil.nodes.link_nodes import leader_standstill
+
+    if order.by_hand:
+        return NodeWorker([LeaderWatch(order.scenario, order.needs)], on_report=_on_report())
+    driver = LeaderDriver(order.scenario, order.needs, order.countdown_s)
+    parting = Parting("the leader ended", lambda now_ns: [leader_standstill(order.scenario, now_ns)])
+    return NodeWorker([driver], parting=parting, on_report=_on_report())
+
+
 def _emulator(order: Order) -> Worker:
+    from hil.emulator.foreign_mocap import ForeignMocapNode
     from hil.emulator.node import EmulatorNode
     from hil.live.node_worker import NodeWorker
+    from hil.wire import topics
+    from hil.wire.source_topics import converts
 
-    return NodeWorker([EmulatorNode(order.scenario, order.needs)], on_report=_on_report())
+    node = EmulatorNode(order.scenario, order.needs)
+    if order.natnet.natnet:
+        from hil.bridge.natnet_emulator import NatNetEmulator
+
+        emulator = NatNetEmulator(node, order.natnet.serving(), on_report=_on_report())
+        click.echo(f"abreast emulator: serves {served(emulator, order.natnet.natnet_address)}", err=True)
+        return emulator
+    if not converts(order.scenario):
+        return NodeWorker([node], on_report=_on_report())
+    frames = (topics.RIGID_BODIES,)
+    foreign = ForeignMocapNode(order.scenario)
+    return NodeWorker([node, foreign], within=frames, on_report=_on_report(), unspoken=frames)
+
+
+def _serve_alone(order: Order, ending: Ending, duration_s: float | None) -> None:
+    """Run the emulator without a wire: the leader drives its program, the followers stand."""
+    from hil.bridge.natnet_emulator import NatNetEmulator, run_alone
+    from hil.emulator.node import EmulatorNode
+
+    emulator = NatNetEmulator(EmulatorNode(order.scenario), order.natnet.serving(), alone=True)
+    line = f"abreast emulator: ready, serves {served(emulator, order.natnet.natnet_address)}"
+    run_alone(emulator, ending, duration_s, lambda: click.echo(line, err=True))
 
 
 def _estimator(order: Order) -> Worker:
     from hil.live.node_worker import NodeWorker
-    from hil.nodes.link_nodes import estimator_node
+    from hil.nodes.link_nodes import estimator_node, frames_within, source_nodes
 
-    return NodeWorker([estimator_node(link) for link in order.links], on_report=_on_report())
+    source = source_nodes(order.links, order.scenario)
+    return NodeWorker(
+        [*source, *map(estimator_node, order.links)],
+        within=frames_within(source),
+        on_report=_on_report(),
+    )
 
 
 def _controller(order: Order) -> Worker:
@@ -147,12 +220,13 @@ def _controller(order: Order) -> Worker:
 
 def _follower(order: Order) -> Worker:
     from hil.live.node_worker import NodeWorker
-    from hil.nodes.link_nodes import controller_node, estimator_node
+    from hil.nodes.link_nodes import controller_node, estimator_node, frames_within, source_nodes
 
     controllers = [controller_node(link) for link in order.links]
+    source = source_nodes(order.links, order.scenario)
     return NodeWorker(
-        [*map(estimator_node, order.links), *controllers],
-        within=[node.topics.estimate for node in controllers],
+        [*source, *map(estimator_node, order.links), *controllers],
+        within=[*frames_within(source), *(node.topics.estimate for node in controllers)],
         parting=_parting("follower", order),
         after_tick=remarks_on({node.law for node in controllers}),
         on_report=_on_report(),
@@ -164,6 +238,17 @@ def _on_report() -> Callable[[bytes], None]:
     from hil.live.finding_lines import FindingLines
 
     return FindingLines(lambda line: click.echo(line, err=True)).hear
+
+
+def _watch_of(order: Order) -> Callable[[Wire], ListenerWatch]:
+    """What watches who listens to the robots that are driven."""
+    from hil.live.listener_watch import Commanded, ListenerWatch
+    from hil.wire.key_layout import layout_of
+    from hil.wire.topics import link_topics
+
+    named = [(link.node_name("listeners"), link_topics(link)) for link in order.links]
+    robots = [Commanded(node, each.cmd_vel, each.odom) for node, each in named]
+    return lambda wire: ListenerWatch(wire, layout_of(order.scenario), robots, _on_report())
 
 
 def _parting(name: str, order: Order) -> Parting:
@@ -183,6 +268,7 @@ def _recorder(order: Order) -> Worker:
 
 _WORKERS: dict[str, Callable[[Order], Worker]] = {
     "emulator": _emulator,
+    "leader": _leader,
     "follower": _follower,
     "estimator": _estimator,
     "controller": _controller,

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 import click
+
+from hil.errors import AbreastError, UsageError
+
+if TYPE_CHECKING:
+    from hil.recordings.column_map import ColumnMap
+    from hil.recordings.imported import Imported
+
+_SHOWN = 5
+Callback = TypeVar("Callback", bound=Callable[..., None])
 
 
 @click.group("import")
@@ -13,27 +23,94 @@ def command() -> None:
     """Turn a recording that is not a log into one, for replay."""
 
 
+def _target(function: Callback) -> Callback:
+    """Options of what is written, and by which scenario."""
+    options = (
+        click.option("--out", type=click.Path(path_type=Path), metavar="LOG", help="The log to write."),
+        click.option("--map", "chart", metavar="FILE", help="Column map: a TOML file or a shipped name."),
+        click.option(
+            "--scenario", metavar="NAME", help="Scenario without a map: a shipped name or a TOML file."
+        ),
+        click.option(
+            "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key of the scenario."
+        ),
+    )
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
 @command.command("csv")
 @click.argument("recording", type=click.Path(path_type=Path))
-@click.option(
-    "--map", "chart", required=True, metavar="FILE", help="Column map: a TOML file or a shipped name."
-)
-@click.option(
-    "--out", required=True, type=click.Path(path_type=Path), metavar="LOG", help="The log to write."
-)
-def import_table(recording: Path, chart: str, out: Path) -> None:
-    """Turn the CSV file RECORDING into a log by a map of its columns."""
-    from hil.recordings.column_map import load_column_map
-    from hil.recordings.csv_import import import_csv
+@_target
+@click.option("--leader", metavar="NAME", help="Body that leads, in an export of a motion capture.")
+@click.option("--follower", metavar="NAME", help="Body that follows.")
+def import_table(
+    recording: Path,
+    out: Path | None,
+    chart: str | None,
+    scenario: str | None,
+    overrides: tuple[str, ...],
+    leader: str | None,
+    follower: str | None,
+) -> None:
+    """Turn RECORDING into a log: an export of Motive or QTM, or a table of columns.
 
-    done = import_csv(recording, load_column_map(chart), out)
-    if done.torn:
-        click.echo(f"{recording}: line {done.torn} is cut off; it is left out", err=True)
+    Columns are known by a map or by their names. What the recording is taken for is told.
+    """
+    from hil.recordings.track_import import import_recording
+
+    log = out or Path(f"{recording.stem}.mcap")
+    used = _chart(recording.stem, chart, scenario, overrides)
+    _tell(str(recording), log, import_recording(recording, used, log, leader, follower))
+
+
+@command.command("tum")
+@click.argument("leader", type=click.Path(path_type=Path))
+@click.argument("follower", type=click.Path(path_type=Path))
+@_target
+def import_tum_pair(
+    leader: Path,
+    follower: Path,
+    out: Path | None,
+    chart: str | None,
+    scenario: str | None,
+    overrides: tuple[str, ...],
+) -> None:
+    """Turn the trajectories LEADER and FOLLOWER, rows of t x y z qx qy qz qw, into a log."""
+    from hil.recordings.track_import import import_tum
+
+    log = out or Path(f"{leader.stem}_{follower.stem}.mcap")
+    used = _chart(log.stem, chart, scenario, overrides)
+    _tell(f"{leader}, {follower}", log, import_tum(leader, follower, used, log))
+
+
+def _chart(name: str, chart: str | None, scenario: str | None, overrides: tuple[str, ...]) -> ColumnMap:
+    from hil.recordings.column_map import load_column_map, no_map
+
+    if chart is None:
+        return no_map(name, scenario, overrides)
+    if scenario is not None:
+        raise UsageError("--scenario: the map says by which scenario; set base in its [scenario] section")
+    return load_column_map(chart, overrides)
+
+
+def _tell(recording: str, log: Path, done: Imported) -> None:
+    """Say what was found; exit 1 if a part of the recording is damaged."""
+    click.echo(f"{recording}: {done.taken_for}", err=True)
+    for role, rows in done.gaps.items():
+        click.echo(f"{recording}: {role} missing in {rows} of {done.rows} rows", err=True)
     click.echo(
-        f"{out}: {done.rows} rows from {done.from_s:g} s to {done.to_s:g} s; "
-        f"go on with: abreast replay {out}",
+        f"{log}: {done.rows} rows from {done.from_s:g} s to {done.to_s:g} s; "
+        f"go on with: abreast replay {log}",
         err=True,
     )
+    for doubt in done.doubts:
+        click.echo(f"! {doubt}", err=True)
+    if done.damage:
+        shown = "; ".join(done.damage[:_SHOWN])
+        rest = f"; and {len(done.damage) - _SHOWN} more" if len(done.damage) > _SHOWN else ""
+        raise AbreastError(f"{recording}: is damaged: {shown}{rest}; left out of {log}, which is written")
 
 
 @command.command("mrclam")

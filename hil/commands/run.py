@@ -12,10 +12,12 @@ from typing import Any
 import click
 
 from formation.collector import collector_paused
+from hil.commands.daemon import DEFAULT_ENDPOINT
 from hil.commands.own_parts import load_own_parts
-from hil.commands.seconds import DURATION
+from hil.commands.seconds import DURATION, Seconds
 from hil.errors import CheckFailedError, UsageError
 from hil.judge.made_by import law_failure
+from hil.live.crew import Crew
 from hil.log.report_json import print_json, results_apart
 from hil.reports.judged_log import claimed, judge_log, made_folder
 from hil.scenario.certify import CERTIFY
@@ -36,7 +38,27 @@ from hil.scenario.schema import Scenario
 @click.option(
     "--lockstep", is_flag=True, help="On a simulated clock, as fast as it goes; same seed, same bytes."
 )
-@click.option("--listen", metavar="ENDPOINT", help="Where the router listens [a free port on loopback].")
+@click.option(
+    "--real", is_flag=True, help="With robots and motion capture that exist, in the place of emulated ones."
+)
+@click.option(
+    "--leader",
+    "driven_by",
+    type=click.Choice(("program", "hand")),
+    help="Who drives a real leader: its program, after a countdown [program], or a hand.",
+)
+@click.option("--countdown", type=Seconds(0.0), help="Seconds from when all are ready to the start [3].")
+@click.option(
+    "--listen",
+    metavar="ENDPOINT",
+    help=f"Where the router listens [a free port on loopback; with --real {DEFAULT_ENDPOINT}].",
+)
+@click.option(
+    "--zenoh-config",
+    type=click.Path(path_type=Path, dir_okay=False, exists=True),
+    metavar="FILE",
+    help="Zenoh config file by which all sessions of the run reach a router that is there.",
+)
 @click.option("--apart", is_flag=True, help="Estimator and controller as two processes, live.")
 @click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override any key of the scenario."
@@ -53,16 +75,13 @@ def command(
     estimator: str | None,
     law: str | None,
     out: Path | None,
-    lockstep: bool,
-    listen: str | None,
-    apart: bool,
     overrides: tuple[str, ...],
     certify: bool,
     as_json: bool,
+    **live: Any,
 ) -> None:
     """Drive SCENARIO (a shipped name or a TOML file) through the whole chain, log it and judge it."""
-    if lockstep and apart:
-        raise UsageError("--apart: a run in lockstep is one process; leave one of --apart and --lockstep out")
+    how = _how(**live)
     given = {"run.duration_s": duration, "run.seed": seed, "estimator.kind": estimator, "controller.law": law}
     options = [f"{key}={value}" for key, value in given.items() if value is not None]
     chosen = load_scenario(scenario, [*overrides, *options, *([CERTIFY] if certify else [])])
@@ -71,15 +90,47 @@ def command(
     load_own_parts(chosen)
     folder = _folder(chosen, out)
     with claimed(folder):
-        _run(chosen, folder, None if lockstep else _Live(listen, apart), as_json=as_json)
+        _run(chosen, folder, how, as_json=as_json)
 
 
 @dataclass(frozen=True, slots=True)
 class _Live:
-    """How to run live: where the router listens, and whether estimator and controller are two processes."""
+    """How to run live: where the router listens or what config leads to one, and who takes part."""
 
     listen: str | None
-    apart: bool
+    zenoh_config: Path | None
+    crew: Crew
+
+
+def _how(
+    lockstep: bool,
+    apart: bool,
+    real: bool,
+    driven_by: str | None,
+    countdown: float | None,
+    listen: str | None,
+    zenoh_config: Path | None,
+) -> _Live | None:
+    """How to run live, None for in lockstep.
+
+    Raises :class:`UsageError` for options that exclude each other.
+    """
+    if lockstep and (apart or real):
+        option = "--apart" if apart else "--real"
+        raise UsageError(
+            f"{option}: a run in lockstep is one process; leave one of {option} and --lockstep out"
+        )
+    if (driven_by is not None or countdown is not None) and not real:
+        option = "--countdown" if driven_by is None else "--leader"
+        raise UsageError(f"{option}: is for a leader that exists; give --real too")
+    if driven_by == "hand" and countdown is not None:
+        raise UsageError("--countdown: who drives the leader by hand counts himself; leave it out")
+    if listen is not None and zenoh_config is not None:
+        raise UsageError("--listen: --zenoh-config leads to a router that is there; leave one out")
+    if lockstep:
+        return None
+    crew = Crew(apart=apart, real=real, by_hand=driven_by == "hand", countdown_s=countdown)
+    return _Live(listen or (DEFAULT_ENDPOINT if real else None), zenoh_config, crew)
 
 
 def _run(chosen: Scenario, folder: Path, live: _Live | None, *, as_json: bool) -> None:
@@ -130,27 +181,37 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> str:
     from rich.text import Text
 
     from hil.live.daemon import Ending
-    from hil.live.finding_lines import FindingLines
-    from hil.live.run import APART, TOGETHER, run_live
+    from hil.live.finding_lines import FindingLines, WaitingLines
+    from hil.live.run import Meeting, run_live
     from hil.live.run_monitor import Snapshot
     from hil.wire.session import reserved_endpoint
 
     ending = Ending()
     ending.on_signals()
     console = Console(file=sys.stderr)
-    starting = console.status(f"starting router, {', '.join(APART if live.apart else TOGETHER)}")
-    with nullcontext(live.listen) if live.listen else reserved_endpoint() as endpoint, starting as status:
+    starting = console.status(f"starting {', '.join(live.crew.daemons)}")
+    known = nullcontext(live.listen) if live.listen or live.zenoh_config else reserved_endpoint()
+    with known as endpoint, starting as status:
+        if live.crew.real:
+            where = live.zenoh_config or endpoint
+            console.print(Text(f"robots and bridges connect to {where}"), soft_wrap=True)
         lines = FindingLines(lambda line: console.print(Text(line), soft_wrap=True))
+        # Who does not watch a terminal is told as well, once for whatever is waited for.
+        waiting = WaitingLines(lambda line: console.is_terminal or console.print(Text(line), soft_wrap=True))
 
         def show(snapshot: Snapshot, elapsed: float | None) -> None:
             for node, findings in list(snapshot.findings.items()):
                 lines.note(node, findings)
+            # What is on the wire may look like markup.
             if elapsed is not None:
-                # What is on the wire may look like markup.
                 status.update(Text(snapshot.line(elapsed, scenario.run.duration_s)))
+            elif live.crew.real and (waits := snapshot.waits_for(())):
+                status.update(Text(waits))
+                waiting.hear(waits)
 
+        meeting = Meeting(endpoint, live.zenoh_config)
         try:
-            outcome = run_live(scenario, log_path, endpoint, ending, show, apart=live.apart)
+            outcome = run_live(scenario, log_path, meeting, ending, show, live.crew)
         finally:
             ending.leave_signals()
     if outcome.interrupted:

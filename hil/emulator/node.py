@@ -15,14 +15,15 @@ from hil.emulator.plant import Plant
 from hil.emulator.robot import Robot
 from hil.emulator.world import CAPTURE, FRAME, NOTHING, SAMPLE, Happened
 from hil.nodes.node import Counts, Outgoing, counted, diagnostics, named_counts, no_counts, outgoing
-from hil.scenario.links import links_of, node_names
+from hil.nodes.start_barrier import NOBODY, Attendance, StartBarrier
+from hil.scenario.links import links_of
 from hil.scenario.ordered_sides import ordered_sides
 from hil.scenario.schema import Scenario
 from hil.scenario.start import chain_poses
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.events import Event
-from hil.wire.messages import MalformedPayloadError, decode_as
+from hil.wire.messages import MalformedPayloadError
 from hil.wire.topics import link_topics
 
 NAME = "emulator"
@@ -34,14 +35,12 @@ _DIAGNOSTICS_NS = 500_000_000
 class EmulatorState:
     """The lab, when its next thing is due, and what the node knows besides; it changes in place.
 
-    ``alive``: nodes that have reported to be well. ``commanded``: followers that have had a command, by
-    their place. ``orders``: how many orders to change sides were given.
+    ``present``: who is there for the start. ``orders``: how many orders to change sides were given.
     """
 
     plant: Plant
     due_ns: int
-    alive: frozenset[str] = frozenset()
-    commanded: frozenset[int] = frozenset()
+    present: Attendance = NOBODY
     refused: Counts = field(default_factory=no_counts)
     next_diagnostics_ns: int = 0
     orders: int = 0
@@ -72,7 +71,7 @@ class EmulatorNode:
     ) -> None:
         self.scenario = scenario
         links = links_of(scenario)
-        self.needs = frozenset(name for need in needs for name in node_names(need, links))
+        self.barrier = StartBarrier(needs, links)
         self.pairs = [link_topics(link) for link in links]
         self.topics = self.pairs[0]
         bodies = (links[0].bodies[0], *(link.bodies[1] for link in links))
@@ -114,25 +113,22 @@ class EmulatorNode:
 
     def _on_command(self, place: int, state: EmulatorState, payload: bytes, now_ns: int) -> None:
         state.plant.command(place, payload, now_ns)
-        if place not in state.commanded:
-            state.commanded |= {place}
-            self._get_ready(state)
+        state.present = state.present.with_command(place)
+        self._get_ready(state)
 
     def _on_stop(self, state: EmulatorState, payload: bytes, now_ns: int) -> None:
         state.plant.halt(now_ns)
 
     def _on_diagnostics(self, state: EmulatorState, payload: bytes, now_ns: int) -> None:
-        if state.alive >= self.needs:
+        if self.barrier.is_open(state.present):
             # Nobody has to be waited for any more, and a chain reports a hundred times a second.
             return
-        report = decode_as(payload, msg.DiagnosticArray)
-        well = {status.name.removeprefix("abreast/") for status in report.status if status.level == 0}
-        state.alive |= well & self.needs
+        state.present = self.barrier.heard(state.present, payload)
         self._get_ready(state)
 
     def _get_ready(self, state: EmulatorState) -> None:
         """Open the start barrier once all are alive and commanded."""
-        if len(state.commanded) == len(self.pairs) and state.alive >= self.needs:
+        if self.barrier.is_open(state.present):
             state.plant.let_go()
 
     def _catch_up(self, state: EmulatorState, now_ns: int) -> tuple[Outgoing, ...]:
@@ -177,16 +173,7 @@ class EmulatorNode:
 
     def report(self, state: EmulatorState, now_ns: int) -> Outgoing:
         """Diagnostics: what the start barrier still waits for, since when the leader moves, frames lost."""
-        missing = sorted(self.needs - state.alive)
-        if not state.commanded:
-            missing.append("a command")
-        elif len(state.commanded) < len(self.pairs):
-            missing += [
-                f"a command to {pair.follower}"
-                for place, pair in enumerate(self.pairs, start=1)
-                if place not in state.commanded
-            ]
-        problem = f"waiting for {', '.join(missing)}" if missing else ""
+        problem = self.barrier.waits_for(state.present)
         world = state.plant.world()
         values: dict[str, object] = {"stopped": world.stopped, "frames": world.frames, "lost": world.lost}
         if world.motion_since_ns >= 0:

@@ -63,6 +63,11 @@ class PlotData:
         certified = CertifiedColumns.of(run_data.certified, columns.span)
         return PlotData(run_data, columns, tracked, true, worst, bounds, errors, orbit, certified)
 
+    @property
+    def truth_name(self) -> str:
+        """What the true course of a quantity is called, by what it is taken from."""
+        return "truth" if self.run_data.tracks is None else "smoothed mocap"
+
     def seconds(self, moments_ns: Stamps) -> FloatArray:
         """Moments as seconds of the run."""
         return np.asarray((moments_ns - self.run_data.zero_ns) * 1e-9, dtype=np.float64)

@@ -56,7 +56,8 @@ def draw_v1(axes: Axes, data: PlotData) -> None:
     fill_band(axes, t, v1, 3.0 * sd)
     axes.plot(*with_gaps(t, v1), color=BELIEVED, lw=0.9, label="estimate")
     if np.any(np.isfinite(columns.truth.v1)):
-        axes.plot(data.seconds(columns.truth.capture_ns), columns.truth.v1, color=TRUE, lw=1.2, label="truth")
+        t_true = data.seconds(columns.truth.capture_ns)
+        axes.plot(t_true, columns.truth.v1, color=TRUE, lw=1.2, label=data.truth_name)
     reach = max(data.run_data.scenario.leader.k_v, float(np.median(v1)))
     judged = data.seconds(columns.samples.capture_ns)
     if "v1" in data.bounds:
@@ -97,7 +98,7 @@ def draw_u1(axes: Axes, data: PlotData) -> None:
     axes.plot(*with_gaps(t, u1), color=BELIEVED, lw=0.9, label="estimate")
     truth = data.columns.truth
     if np.any(np.isfinite(truth.u1)):
-        axes.plot(data.seconds(truth.capture_ns), truth.u1, color=TRUE, lw=1.2, label="truth")
+        axes.plot(data.seconds(truth.capture_ns), truth.u1, color=TRUE, lw=1.2, label=data.truth_name)
     reach = 2.0 * data.run_data.scenario.leader.k_u
     limit_to(axes, -reach, reach)
     axes.set_ylabel("$u_1$ [rad/s]")
@@ -171,7 +172,7 @@ def _draw_shape(axes: Axes, data: PlotData, true: FloatArray, seen: Values, colu
         axes.plot(*ideal, color=ORBIT, lw=1.1, ls="--", label="noise-free", zorder=3)
     if known:
         truth = with_gaps(data.seconds(moments), broken_at_jumps(true))
-        axes.plot(*truth, color=TRUE, lw=1.4, label="truth")
+        axes.plot(*truth, color=TRUE, lw=1.4, label=data.truth_name)
     if data.orbit is None or not known:
         t = data.seconds(data.tracked.capture_ns)
         estimate = with_gaps(t, broken_at_jumps(np.asarray(seen)))

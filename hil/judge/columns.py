@@ -14,6 +14,7 @@ from estimation.bounds.error_bounds import Perceived
 from estimation.tracking.estimate import QUANTITIES
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
+from hil.judge.mocap_truth import smoothed_truth
 from hil.judge.run_data import RunData, Span, evaluation_span, run_span
 from hil.judge.true_states import Stamps, TrueStates
 from hil.nodes.controller_desk import STOPS
@@ -209,8 +210,13 @@ def command_columns(run_data: RunData) -> CommandColumns:
 
 
 def true_states(run_data: RunData) -> TrueStates:
-    """Columns of a run's truth, of the robots even where the log's is of the bodies on them."""
+    """Columns of a run's truth, of the robots even where the log's is of the bodies on them.
+
+    Where nobody knows the truth of a run they are those of the smoothed tracks of the motion capture.
+    """
     kept, scenario = run_data.kept, run_data.scenario
+    if run_data.tracks is not None:
+        return smoothed_truth(run_data.tracks, scenario)
     states = TrueStates.of(run_data.truth) if kept is None else TrueStates.of_rows(kept.truths)
     if not run_data.truth_of_bodies:
         return states

@@ -38,14 +38,15 @@ def judge_estimation(run_data: RunData, columns: Columns) -> dict[str, object]:
     and ``coverage_3sigma`` (the share of errors within three of the estimate's own standard deviations): over
     the samples at which the quantity's truth is known. ``efficiency``: RMSE over the root mean square of the
     posterior Cramer-Rao bound at these samples; only for the world front end, whose noise it is about.
-    ``nees``, ``nees_limits``: see :func:`hil.judge.consistency.judge_nees`.
+    ``nees``, ``nees_limits``: see :func:`hil.judge.consistency.judge_nees`. Where smoothed tracks stand in
+    for the truth, which err as much as good estimates, there are neither these nor coverage nor efficiency.
     """
     samples, estimates = columns.samples, columns.estimates
     nis = samples.nis[np.isfinite(samples.nis)]
     judged = int(np.count_nonzero(inside(estimates.capture_ns, columns.span)))
     errors = estimate_errors(columns)
     rmse = {name: _rms(error) for name, error in errors.items()}
-    return {
+    told = {
         "evaluated_from_s": (columns.span.from_ns - run_data.zero_ns) / 1e9,
         "samples": len(samples.capture_ns),
         "untracked": judged - len(samples.capture_ns),
@@ -53,6 +54,11 @@ def judge_estimation(run_data: RunData, columns: Columns) -> dict[str, object]:
         "nis_mean": float(nis.mean()) if len(nis) else None,
         "rmse": rmse,
         "max": {name: float(np.nanmax(np.abs(error))) for name, error in errors.items()},
+    }
+    if run_data.tracks is not None:
+        return told
+    return {
+        **told,
         "efficiency": _efficiency(run_data, columns, rmse),
         "coverage_3sigma": _coverage(columns, errors),
         **judge_nees(samples, errors),

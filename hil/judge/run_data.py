@@ -13,10 +13,12 @@ from hil.errors import UsageError
 from hil.judge.findings import of_follower
 from hil.judge.frames import Frames, Numbered, frames_of
 from hil.judge.made_by import law_facts
+from hil.judge.mocap_truth import MocapTracks, tracks_of
 from hil.judge.side_orders import Order, orders_of
 from hil.judge.sound_messages import is_sound
 from hil.log.metadata import (
     IMPORT,
+    LIVE,
     mode_of,
     recorded_certificate,
     scenario_of,
@@ -28,7 +30,7 @@ from hil.nodes.noise_report import scale_in
 from hil.replay.kept import Kept, KeptReplay
 from hil.scenario.certificate import certificate_json, certificate_of
 from hil.scenario.certify import same_steps
-from hil.scenario.links import Link
+from hil.scenario.links import STARTERS, Link
 from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.events import digest
@@ -62,7 +64,7 @@ class RunData:
     """All that :func:`hil.judge.summary.summarise` looks at; messages in the order of their publication.
 
     ``taken``, ``refused``: the estimator's counts, by kind and by cause. ``zero_ns``: where the run's time in
-    seconds counts from. ``motion_since_ns``: when an emulated leader set off, None for other recordings.
+    seconds counts from. ``motion_since_ns``: when the leader of a run set off, None for other recordings.
     ``stopped_ns``: when the first stop was ordered, None for none. ``evaluate_from_ns``,
     ``evaluate_to_ns``: limits of the evaluation that take the place of those in the scenario. ``frames`` and
     ``log``: None where they are not known. ``arrivals``: all frames that the estimator could read, as they
@@ -73,6 +75,8 @@ class RunData:
     law of one's own. ``noise_scale``: noise of positions as it was found over what was told, None if it was
     not looked for. ``found``: findings by the nodes' names, None where no node could have told any.
     ``truth_of_bodies``: whether the truth in the log is of rigid bodies and not of the robots below.
+    ``tracks``: in the place of a truth that nobody knows, what the motion capture showed of a run with robots
+    that exist.
 
     A replay is judged on the run data of its log with its own estimates and counts put in by
     :func:`dataclasses.replace`.
@@ -101,6 +105,7 @@ class RunData:
     noise_scale: float | None = None
     found: Mapping[str, Findings] | None = None
     truth_of_bodies: bool = False
+    tracks: MocapTracks | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,17 +192,18 @@ def run_data_of_link(log: Log, link: Link) -> RunData:
     estimates = _decoded(log, records[names.estimate], LeaderEstimate)
     truth = _decoded(log, records[names.truth], Truth)
     arrivals = _arrivals(log, records[topics.RIGID_BODIES], estimates)
-    since = counts.get("emulator", {}).get("motion_since_ns")
+    mode = mode_of(log) or IMPORT
     run_data = RunData(
         scenario=scenario,
-        mode=mode_of(log) or IMPORT,
+        mode=mode,
         truth_of_bodies=truth_is_of_bodies(log),
+        tracks=tracks_of(log, link) if mode == LIVE and not truth else None,
         estimates=estimates,
         commands=_decoded(log, records[names.command], Command),
         truth=truth,
         taken=_group(estimator, "taken"),
         refused=_group(estimator, "refused"),
-        motion_since_ns=int(since) if since and _is_count(since) else None,
+        motion_since_ns=_set_off_ns(counts),
         stopped_ns=records[topics.STOP][0].log_ns if records[topics.STOP] else None,
         frames=_frames(scenario, arrivals, truth),
         arrivals=arrivals,
@@ -215,16 +221,17 @@ def run_data_of_link(log: Log, link: Link) -> RunData:
 def run_data_of_kept(log: Log, replay: KeptReplay) -> RunData:
     """Run data of what a replay in one pass has kept of a follower; see :func:`run_data_of_link`."""
     link, kept = replay.link, replay.kept
-    since = kept.reports.get("emulator", {}).get("motion_since_ns")
+    mode = mode_of(log) or IMPORT
     sides = [_side_of(log, link, each) for each in kept.sides]
     run_data = RunData(
         scenario=link.scenario,
-        mode=mode_of(log) or IMPORT,
+        mode=mode,
         truth_of_bodies=truth_is_of_bodies(log),
+        tracks=tracks_of(log, link) if mode == LIVE and not len(kept.truths) else None,
         estimates=(),
         taken=replay.taken,
         refused=replay.refused,
-        motion_since_ns=int(since) if since and _is_count(since) else None,
+        motion_since_ns=_set_off_ns(kept.reports),
         stopped_ns=kept.stopped_ns,
         frames=frames_of(
             link.scenario,
@@ -318,6 +325,12 @@ def _last_counts(reports: Sequence[DiagnosticArray]) -> dict[str, dict[str, str]
         for report in reports
         for status in report.status
     }
+
+
+def _set_off_ns(reports: Mapping[str, Mapping[str, str]]) -> int | None:
+    """When the leader set off, by who let it: the emulator, or the daemon of a real one."""
+    told = (reports.get(node, {}).get("motion_since_ns", "") for node in STARTERS)
+    return next((int(text) for text in told if _is_count(text)), None)
 
 
 def _group(values: Mapping[str, str], group: str) -> dict[str, int]:

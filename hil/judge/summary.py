@@ -39,7 +39,9 @@ def summarise(run_data: RunData) -> dict[str, Any]:
     of the scenario's duration. ``estimation.untracked``: estimates in that time that said anything else.
     ``frames.rejected``: inputs that were refused, the robots' odometry included; frames that also held
     strangers do not count. ``commands``: those from when the leader set off to the stop. ``seed`` and ``law``
-    are absent for recordings that were not driven by them. ``certified``: only where estimates are certified.
+    are absent for recordings that were not driven by them. ``truth``: mocap where the smoothed tracks of the
+    motion capture stand in for it, absent where it is known or nothing stands in. ``certified``: only where
+    estimates are certified.
     ``law``: a name, of one's own more (:func:`hil.judge.made_by.law_json`).
     ``findings``: what nodes found to be wrong, and the judge (:mod:`hil.judge.findings`); absent where nobody
     could have told. ``orders_refused``: why the scenario's own orders to change sides were, if they were.
@@ -53,8 +55,9 @@ def summarise(run_data: RunData) -> dict[str, Any]:
     estimation = judge_estimation(run_data, columns)
     summary = {
         "scenario": given.name,
-        "seed": given.run.seed if driven else None,
+        "seed": given.run.seed if driven and run_data.tracks is None else None,
         "mode": run_data.mode,
+        "truth": None if run_data.tracks is None else "mocap",
         "estimator": short(given.estimator.kind),
         "law": law_json(given, run_data.law) if driven or len(columns.commands.issued_ns) else None,
         "duration_s": columns.run.seconds,

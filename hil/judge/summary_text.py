@@ -62,6 +62,8 @@ def verdict_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     seed = f", seed {summary['seed']}" if "seed" in summary else ""
     title = f"{summary['scenario']}, {summary['mode']}, {summary['duration_s']:.1f} s ({who}{seed})"
     yield "run", title, PLAIN
+    if summary.get("truth") == "mocap":
+        yield "judged", "by the smoothed mocap tracks, whose own errors are in what follows", PLAIN
     yield from _estimate_lines(summary)
     yield from _certified_line(summary)
     formation = summary.get("formation", {})

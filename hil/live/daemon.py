@@ -10,8 +10,9 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from types import FrameType
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
+from hil.live.listener_watch import ListenerWatch
 from hil.nodes.node import Outgoing
 from hil.scenario.schema import Scenario
 from hil.wire.events import TICK, Event
@@ -43,6 +44,16 @@ class Worker(Protocol):
 
     def end(self, now_ns: int) -> Iterable[Outgoing]:
         """Last words."""
+
+
+class Presence(NamedTuple):
+    """What the ROS graph calls a worker, and what makes the watch on who listens to it there."""
+
+    name: str = ""
+    make_watch: Callable[[Wire], ListenerWatch] | None = None
+
+
+ANONYMOUS = Presence()
 
 
 class Ending:
@@ -98,6 +109,7 @@ def run_daemon(
     ending: Ending,
     duration_s: float | None = None,
     on_ready: Callable[[], None] = lambda: None,
+    presence: Presence = ANONYMOUS,
 ) -> int:
     """Run a worker on the wire until the end is asked for or ``duration_s`` is over.
 
@@ -106,17 +118,19 @@ def run_daemon(
     scenario has them. Returns how many arrivals found the inbox full and were dropped.
     """
     session = open_session(endpoints, give_up=lambda: ending.asked)
-    wire = Wire(session, urgent_topics(scenario), layout_of(scenario))
+    wire = Wire(session, urgent_topics(scenario), layout_of(scenario), presence.name)
     try:
         ending.notify(wire.wake)
         worker = make_worker()
         worker.begin(time.time_ns())
-        wire.subscribe(worker.subscribes)
+        # Who takes down everything is not who a message is meant for.
+        wire.subscribe(worker.subscribes, shown=not worker.thorough)
         # What is loaded by now stays for good; walking it again would halt a live step for 100 ms and more.
         gc.freeze()
+        watch = presence.make_watch(wire) if presence.make_watch else None
         on_ready()
         try:
-            _work(worker, wire, ending, duration_s)
+            _work(worker, wire, ending, duration_s, watch)
         except Exception:
             # A controller that breaks down says stop all the same. The first error is the one to tell.
             with contextlib.suppress(Exception):
@@ -139,7 +153,9 @@ def aftermath(inbox: Inbox, worker: Worker) -> Iterator[Iterable[Outgoing]]:
         yield worker.take(event, time.time_ns())
 
 
-def _work(worker: Worker, wire: Wire, ending: Ending, duration_s: float | None) -> None:
+def _work(
+    worker: Worker, wire: Wire, ending: Ending, duration_s: float | None, watch: ListenerWatch | None
+) -> None:
     until = None if duration_s is None else time.monotonic() + duration_s
     taken_ns = 0
     while not ending.asked and (until is None or time.monotonic() < until):
@@ -154,6 +170,8 @@ def _work(worker: Worker, wire: Wire, ending: Ending, duration_s: float | None) 
         # Also while arrivals are waiting: who is flooded must not fall silent.
         if (taken_ns := time.time_ns()) >= worker.due_ns():
             _publish(wire, worker.take(TICK, taken_ns))
+        if watch is not None:
+            _publish(wire, watch.reports(taken_ns))
     for messages in aftermath(wire.inbox, worker):
         _publish(wire, messages)
 

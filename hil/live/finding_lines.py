@@ -1,7 +1,8 @@
-"""Lines for a terminal, when a node begins to find something and when it finds it no more."""
+"""Lines for a terminal, when a node begins to find something or no more does, and for what a start waits."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 from hil.nodes.findings import PREFIX, Findings, finding_line, findings_in, findings_json
@@ -9,6 +10,7 @@ from hil.wire.message_types import DiagnosticArray
 from hil.wire.messages import MalformedPayloadError, decode_as
 
 _PREFIX = PREFIX.encode()
+_NUMBER = re.compile(r"[0-9.]+ s\b")
 
 
 class FindingLines:
@@ -41,3 +43,18 @@ class FindingLines:
         self._known[node] = dict(findings)
         if not findings:
             del self._known[node]
+
+
+class WaitingLines:
+    """Says for what a start waits, whenever that is something else; seconds that are counted down are not."""
+
+    def __init__(self, say: Callable[[str], object]) -> None:
+        self._say = say
+        self._known = ""
+
+    def hear(self, waits: str) -> None:
+        """Hear what is waited for now."""
+        counted = _NUMBER.sub("", waits)
+        if counted != self._known:
+            self._known = counted
+            self._say(waits)

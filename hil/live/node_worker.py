@@ -33,7 +33,8 @@ class NodeWorker:
 
     ``within``: topics on which one of the nodes speaks to another. Such a message goes to its listeners at
     once, and each takes it in at a time of its own, by ``clock`` [ns]; it is published before what they
-    make of it, and nobody here listens to these topics on the wire. ``after_tick``: called after every tick.
+    make of it, and nobody here listens to these topics on the wire. ``unspoken``: those of them that nobody
+    else is to hear. ``after_tick``: called after every tick.
     ``on_report``: called with the diagnostics of every node.
     """
 
@@ -47,6 +48,7 @@ class NodeWorker:
         clock: Callable[[], int] = time.time_ns,
         after_tick: Callable[[], None] = lambda: None,
         on_report: Callable[[bytes], None] = lambda _: None,
+        unspoken: Collection[str] = (),
     ) -> None:
         # Listeners first: where all tick at once they have had theirs before they hear, later, of another's.
         self.nodes = tuple(sorted(nodes, key=lambda node: set(within).isdisjoint(node.subscribes)))
@@ -54,7 +56,7 @@ class NodeWorker:
         self._within = {topic: self._readers[topic] for topic in within if topic in self._readers}
         self.subscribes = tuple(topic for topic in self._readers if topic not in self._within)
         self._parting, self._clock, self._after_tick = parting, clock, after_tick
-        self._on_report = on_report
+        self._on_report, self._unspoken = on_report, unspoken
         self._states: list[Any] = []
         self._dues: list[int] = []
         self._now_ns = 0
@@ -113,7 +115,8 @@ class NodeWorker:
         state, said = node.step(self._states[place], event, now_ns)
         self._states[place], self._dues[place] = state, node.due_ns(state)
         for message in said:
-            yield message
+            if message.topic not in self._unspoken:
+                yield message
             if message.topic == topics.DIAGNOSTICS:
                 self._on_report(message.payload)
             if listeners := self._within.get(message.topic):

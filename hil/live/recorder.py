@@ -8,7 +8,7 @@ import numpy as np
 
 from hil.live.certificate_process import CertificateProcess
 from hil.log.described_log import DescribedLog
-from hil.log.metadata import log_metadata
+from hil.log.metadata import LIVE, log_metadata
 from hil.nodes.node import Outgoing, counted, diagnostics, is_due, named_counts, no_counts, outgoing
 from hil.scenario.schema import Scenario
 from hil.wire import topics
@@ -34,7 +34,7 @@ class Recorder:
     def __init__(self, scenario: Scenario, path: Path) -> None:
         self._types = topics.types_of(scenario)
         self.subscribes = tuple(topic for topic in self._types if topic not in topics.ONLY_IN_LOGS)
-        self._log = DescribedLog(path, log_metadata(scenario, "live"))
+        self._log = DescribedLog(path, log_metadata(scenario, LIVE))
         self._counts = no_counts()
         self._next_flush_ns = 0
         self._next_report_ns = 0

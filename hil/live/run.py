@@ -6,35 +6,27 @@ apart, the controllers share one, the estimators one for every few of them.
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from formation.pose import STANDSTILL
 from hil.errors import UsageError
 from hil.live.child_processes import Children
+from hil.live.crew import Crew, processes_of
 from hil.live.daemon import Ending
 from hil.live.run_monitor import RunMonitor, Snapshot
+from hil.nodes.link_nodes import leader_standstill, standstill
 from hil.scenario.files import scenario_text
-from hil.scenario.links import HOSTED, Link, links_of, node_names
+from hil.scenario.links import HOSTED, links_of, node_names
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
-from hil.wire.drive_message import drive_message
 from hil.wire.key_layout import layout_of
 from hil.wire.messages import encode
 from hil.wire.pubsub import Wire
-from hil.wire.session import Endpoints, close_session, open_session
+from hil.wire.session import Endpoints, close_session, open_session, reachable
 from hil.wire.topics import link_topics, urgent_topics
-
-TOGETHER = ("recorder", "follower", "emulator")
-APART = ("recorder", "estimator", "controller", "emulator")
-"""The daemons of a run with estimator and controller of a follower in one process, and in two."""
-
-FOLLOWERS_PER_PROCESS = {"follower": 32, "estimator": 4}
-"""A process in Python keeps up with that many at 120 frames a second."""
 
 START_TIMEOUT = 120.0
 """For the start barrier, from when a daemon was last heard for the first time [s]: it may have to compile."""
@@ -55,13 +47,34 @@ class Outcome:
     duration_s: float
 
 
+@dataclass(frozen=True, slots=True)
+class Meeting:
+    """Where all meet: the endpoint at which we are the router, or a Zenoh config file that everybody uses."""
+
+    listen: str | None
+    config_file: Path | None = None
+
+    @property
+    def ours(self) -> Endpoints:
+        """How a session of the run gets there."""
+        if self.config_file is not None:
+            return Endpoints(config_file=self.config_file)
+        return Endpoints(connect=reachable(str(self.listen)))
+
+    @property
+    def options(self) -> list[str]:
+        """The same for a daemon's command line."""
+        if self.config_file is not None:
+            return ["--zenoh-config", str(self.config_file)]
+        return ["--connect", str(self.ours.connect)]
+
+
 def run_live(
-    scenario: Scenario, log_path: Path, endpoint: str, ending: Ending, show: Show, *, apart: bool = False
+    scenario: Scenario, log_path: Path, meeting: Meeting, ending: Ending, show: Show, crew: Crew
 ) -> Outcome:
     """Run a scenario live for its duration, or until the end is asked for, or until a daemon fails.
 
-    The router listens on ``endpoint``, where others may connect too. ``apart``: estimators and controllers
-    are processes of their own. The scenario as it is run is put beside the log.
+    Others may connect to the router too; real robots do. The scenario as it is run is put beside the log.
     ``show`` gets the snapshot of the run and the time since the leader set off (None before), some 20 times a
     second. However it ends, the robots are stopped, the log is finished and no process is left.
     """
@@ -73,51 +86,38 @@ def run_live(
         raise UsageError(
             f"--out {folder}: cannot be written ({error.strerror}); give another folder"
         ) from None
-    router = open_session(Endpoints(listen=endpoint))
-    supervisor = _Supervisor(scenario, resolved, log_path, endpoint, APART if apart else TOGETHER)
+    router = None if meeting.config_file else open_session(Endpoints(listen=meeting.listen))
+    supervisor = _Supervisor(scenario, resolved, log_path, meeting, crew)
     try:
         return supervisor.run(ending, show)
     finally:
         supervisor.close()
-        close_session(router)
-
-
-def processes_of(links: Sequence[Link], daemons: Sequence[str]) -> Iterator[tuple[str, str, tuple[str, ...]]]:
-    """Name, daemon, and the followers that it serves, of every process of a run; none named means all."""
-    for daemon in daemons:
-        count = math.ceil(len(links) / FOLLOWERS_PER_PROCESS.get(daemon, len(links)))
-        if count == 1:
-            yield daemon, daemon, ()
-            continue
-        each = math.ceil(len(links) / count)
-        for number in range(count):
-            share = links[number * each : (number + 1) * each]
-            yield f"{daemon}{number + 1}", daemon, tuple(link.follower for link in share)
+        if router is not None:
+            close_session(router)
 
 
 class _Supervisor:
     def __init__(
-        self, scenario: Scenario, resolved: Path, log_path: Path, endpoint: str, daemons: Sequence[str]
+        self, scenario: Scenario, resolved: Path, log_path: Path, meeting: Meeting, crew: Crew
     ) -> None:
-        self._scenario = scenario
-        links = links_of(scenario)
-        self._pairs = [link_topics(link) for link in links]
-        self._nodes = [name for daemon in daemons for name in node_names(daemon, links)]
-        self._session = open_session(Endpoints(connect=endpoint))
-        self._wire = Wire(self._session, urgent_topics(scenario), layout_of(scenario))
-        self._monitor = RunMonitor(self._session, self._pairs, layout_of(scenario))
+        self._scenario, self._crew = scenario, crew
+        self._links = links_of(scenario)
+        pairs = [link_topics(link) for link in self._links]
+        self._nodes = [name for daemon in crew.daemons for name in node_names(daemon, self._links)]
+        self._session = open_session(meeting.ours)
+        self._wire = Wire(self._session, urgent_topics(scenario), layout_of(scenario), "run")
+        wheels = [pair.odom for pair in pairs] if crew.real else []
+        if crew.drives_leader:
+            wheels.append(pairs[0].leader_odom)
+        self._monitor = RunMonitor(self._session, pairs, layout_of(scenario), wheels)
         self._children = Children(log_path.parent)
-        extra = {
-            "recorder": ["--out", str(log_path)],
-            "emulator": ["--needs", ",".join(daemon for daemon in daemons if daemon != "emulator")],
-        }
         self._drivers: list[str] = []
-        for name, daemon, followers in processes_of(links, daemons):
-            arguments = [str(resolved), "--connect", endpoint, *extra.get(daemon, [])]
+        for name, daemon, followers in processes_of(self._links, crew.daemons):
+            arguments = [str(resolved), *meeting.options, *crew.options(daemon, log_path)]
             for follower in followers:
                 arguments += ["--follower", follower]
             self._children.start(name, daemon, arguments)
-            if daemon in HOSTED:
+            if daemon in HOSTED or daemon == "leader":
                 self._drivers.append(name)
 
     def run(self, ending: Ending, show: Show) -> Outcome:
@@ -133,9 +133,10 @@ class _Supervisor:
                 set_off = now - (time.time_ns() - snapshot.motion_since_ns) * 1e-9
             if len(snapshot.heard) > known:
                 begun, known = now, len(snapshot.heard)
-            if set_off is None and now - begun > START_TIMEOUT:
+            if set_off is None and now - begun > START_TIMEOUT and not self._may_wait(snapshot):
                 failure = (
-                    f"the start barrier did not open within {START_TIMEOUT:g} s: {self._waiting(snapshot)}"
+                    f"the start barrier did not open within {START_TIMEOUT:g} s: "
+                    f"{snapshot.waits_for(self._nodes) or 'no daemon says why'}"
                 )
             show(snapshot, None if set_off is None else now - set_off)
             if set_off is not None and now - set_off >= duration:
@@ -154,6 +155,10 @@ class _Supervisor:
         self._wire.close()
         close_session(self._session)
 
+    def _may_wait(self, snapshot: Snapshot) -> bool:
+        """Whether what is waited for may take its time: people who set up robots do, daemons do not."""
+        return self._crew.real and snapshot.heard.keys() >= set(self._nodes)
+
     def _failure(self, timeout: float) -> str:
         """What has gone wrong, if anything, within ``timeout`` [s]."""
         ended = self._children.wait_for_end_of_any(timeout)
@@ -166,25 +171,27 @@ class _Supervisor:
         return f"the {silent} has said nothing for {SILENCE:g} s" if silent else ""
 
     def _stop(self, reason: str) -> None:
-        """Stop everybody, speak for a controller that may be gone, and wait until the robots stand."""
+        """Stop everybody, speak for drivers that may be gone, and wait until the robots stand."""
         self._wire.publish(topics.STOP, encode(msg.String(data=reason)))
-        for pair in self._pairs:
-            still = drive_message(STANDSTILL, time.time_ns(), pair.follower, stamped=pair.stamped)
-            self._wire.publish(pair.cmd_vel, encode(still))
+        self._tell_to_stand()
         deadline = time.monotonic() + STANDSTILL_TIMEOUT
         while time.monotonic() < deadline and self._somebody_moves():
             time.sleep(_GLANCE)
+            if self._crew.real:
+                # What real robots hear may be lost on the way.
+                self._tell_to_stand()
         time.sleep(_GLANCE)
 
-    def _somebody_moves(self) -> bool:
-        """Whether a robot that was seen has yet to stand; without the emulator none ever will."""
-        snapshot = self._monitor.update()
-        return bool(snapshot.truths) and not snapshot.standing and self._children.running("emulator")
+    def _tell_to_stand(self) -> None:
+        still = [standstill(link, time.time_ns()) for link in self._links]
+        if self._crew.drives_leader:
+            still.append(leader_standstill(self._scenario, time.time_ns()))
+        for message in still:
+            self._wire.publish(message.topic, message.payload)
 
-    def _waiting(self, snapshot: Snapshot) -> str:
-        """What the start barrier waits for, in words."""
-        unheard = [name for name in self._nodes if name not in snapshot.heard]
-        if unheard:
-            return f"nothing was heard of {', '.join(unheard)}"
-        problems = [f"{name}: {problem}" for name, problem in snapshot.problems.items() if problem]
-        return "; ".join(problems) or "no daemon says why"
+    def _somebody_moves(self) -> bool:
+        """Whether a robot that was seen has yet to stand; without the emulator no emulated one ever will."""
+        snapshot = self._monitor.update()
+        if snapshot.wheels:
+            return not snapshot.wheels_stand
+        return bool(snapshot.truths) and not snapshot.standing and self._children.running("emulator")

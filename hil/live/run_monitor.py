@@ -11,7 +11,9 @@ from typing import TypeVar
 import zenoh
 
 from estimation.tracking.tracker import Status
+from formation.pose import Motion
 from hil.nodes.findings import Findings, findings_in
+from hil.scenario.links import STARTERS
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.key_layout import OURS, KeyLayout
@@ -32,6 +34,7 @@ class Snapshot:
 
     ``followers``: their names from the leader on. ``observed_s``: for how long we have looked. ``heard``: at
     which ``observed_s`` each node last reported, ``problems``: what it said, ``findings``: what it found.
+    ``wheels``: what real robots say of their own motion, by topic.
     """
 
     followers: tuple[str, ...] = ()
@@ -44,6 +47,7 @@ class Snapshot:
     certified: dict[str, msg.CertifiedEstimate] = field(default_factory=dict)
     commands: dict[str, msg.Command] = field(default_factory=dict)
     truths: dict[str, msg.Truth] = field(default_factory=dict)
+    wheels: dict[str, Motion] = field(default_factory=dict)
 
     @property
     def standing(self) -> bool:
@@ -53,6 +57,21 @@ class Snapshot:
             max(abs(truth.v1), abs(truth.v2)) < _STILL_V and max(abs(truth.u1), abs(truth.u2)) < _STILL_U
             for truth in truths
         )
+
+    @property
+    def wheels_stand(self) -> bool:
+        """Whether all real robots stand that were heard of."""
+        return all(abs(each.v) < _STILL_V and abs(each.u) < _STILL_U for each in self.wheels.values())
+
+    def waits_for(self, names: Iterable[str]) -> str:
+        """What the start waits for, in words, empty for nothing that anybody tells.
+
+        ``names``: the nodes that are needed.
+        """
+        unheard = [name for name in names if name not in self.heard]
+        if unheard:
+            return f"nothing was heard of {', '.join(unheard)}"
+        return "; ".join(f"{name}: {problem}" for name, problem in self.problems.items() if problem)
 
     def silent(self, names: Iterable[str], patience: float) -> str | None:
         """A node that has reported before but not in the last ``patience`` [s]."""
@@ -91,18 +110,24 @@ class RunMonitor:
     """Keeps a :class:`Snapshot` up to date from a session's subscriptions.
 
     Zenoh keeps the newest payload of a topic for us: Python is not called for each one of a long chain's.
+    ``wheels``: topics of the odometry that is to be looked at.
     """
 
-    def __init__(self, session: zenoh.Session, pairs: Sequence[Topics], layout: KeyLayout = OURS) -> None:
+    def __init__(
+        self,
+        session: zenoh.Session,
+        pairs: Sequence[Topics],
+        layout: KeyLayout = OURS,
+        wheels: Sequence[str] = (),
+    ) -> None:
         self.snapshot = Snapshot(tuple(pair.follower for pair in pairs))
         self._updated_at = time.monotonic()
-        self._diagnostics = session.declare_subscriber(layout.key(topics.DIAGNOSTICS), self._on_diagnostics)
+        self._diagnostics = session.declare_subscriber(layout.heard(topics.DIAGNOSTICS), self._on_diagnostics)
         self._newest = {
-            topic: session.declare_subscriber(layout.key(topic), zenoh.handlers.RingChannel(1))
-            for pair in pairs
-            for topic in (pair.estimate, pair.certified, pair.command, pair.truth)
+            topic: session.declare_subscriber(layout.heard(topic), zenoh.handlers.RingChannel(1))
+            for topic in (*wheels, *(topic for pair in pairs for topic in _told_of(pair)))
         }
-        self._pairs = pairs
+        self._pairs, self._wheels = pairs, wheels
 
     def update(self) -> Snapshot:
         """The snapshot as of now. Payloads are decoded here, not in Zenoh's threads."""
@@ -126,6 +151,10 @@ class RunMonitor:
                 snapshot.commands[who] = sent
             if true := _sound(latest, pair.truth, msg.Truth):
                 snapshot.truths[who] = true
+        for topic in self._wheels:
+            if turned := _sound(latest, topic, msg.Odometry):
+                twist = turned.twist.twist
+                snapshot.wheels[topic] = Motion(twist.linear.x, twist.angular.z)
         return snapshot
 
     def close(self) -> None:
@@ -147,8 +176,12 @@ class RunMonitor:
             self.snapshot.heard[name] = self.snapshot.observed_s
             self.snapshot.problems[name] = status.message if status.level else ""
             for value in status.values:
-                if name == "emulator" and value.key == "motion_since_ns" and value.value.isdecimal():
+                if name in STARTERS and value.key == "motion_since_ns" and value.value.isdecimal():
                     self.snapshot.motion_since_ns = min(int(value.value), stamp_ns)
+
+
+def _told_of(pair: Topics) -> tuple[str, ...]:
+    return pair.estimate, pair.certified, pair.command, pair.truth
 
 
 def _sound(latest: Mapping[str, bytes], topic: str, kind: type[M]) -> M | None:

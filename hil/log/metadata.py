@@ -20,6 +20,8 @@ from hil.scenario.schema import Scenario
 CERTIFICATE = "abreast.certificate"
 IMPORT = "import"
 """Mode of a log that was made from another recording."""
+LIVE = "live"
+"""Mode of a log that a recorder wrote."""
 
 
 def log_metadata(scenario: Scenario, mode: str) -> dict[str, dict[str, str]]:

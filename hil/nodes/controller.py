@@ -10,9 +10,11 @@ from controllers.station_keeper import StationState, at_station
 from estimation.tracking.prediction import SentCommand, Sight, rows_for
 from estimation.tracking.tracker import Status
 from formation.lending import lent
+from formation.pose import STANDSTILL, Motion
 from formation.records import columns_of, copy_of, load, row_of, rows_of, store
 from formation.ring import place
 from formation.station import Side
+from hil.nodes.answer_watch import UNASKED, AnswerWatch, answer_findings, with_answer
 from hil.nodes.control_rules import control_rules
 from hil.nodes.controller_desk import (
     COUNTED,
@@ -55,15 +57,16 @@ _STOPS = packed_texts(["", *STOPS])
 class ControllerState:
     """All that the controller remembers; it changes in place.
 
-    ``desk``: rows with all but when the next report is due.
+    ``desk``: rows with all but when the next report is due, and the ``answers`` seen at reports.
     """
 
-    __slots__ = ("_due_ns", "desk", "lent", "next_diagnostics_ns")
+    __slots__ = ("_due_ns", "answers", "desk", "lent", "next_diagnostics_ns")
 
-    def __init__(self, desk: Desk, next_diagnostics_ns: int) -> None:
+    def __init__(self, desk: Desk, next_diagnostics_ns: int, answers: AnswerWatch = UNASKED) -> None:
         self.desk = desk
         self.lent = lent(desk)
         self.next_diagnostics_ns = next_diagnostics_ns
+        self.answers = answers
         self._due_ns = columns_of(desk.control)["next_tick_ns"]
 
     def copy(self) -> ControllerState:
@@ -78,7 +81,7 @@ class ControllerState:
             event=copy_of(desk.event),
             result=copy_of(desk.result),
         )
-        return ControllerState(kept, self.next_diagnostics_ns)
+        return ControllerState(kept, self.next_diagnostics_ns, self.answers)
 
     def due_ns(self) -> int:
         """When the next command is due."""
@@ -111,6 +114,23 @@ class ControllerState:
         """Commands since the capture of that, oldest first, and the one before."""
         sent, commands = self.known.sent, self.desk.commands
         return tuple(load(SentCommand, commands, place(sent, commands, k)) for k in range(sent.length))
+
+    @property
+    def asked(self) -> Motion:
+        """What the robot was told last."""
+        sent, commands = self.known.sent, self.desk.commands
+        if not sent.length:
+            return STANDSTILL
+        newest = load(SentCommand, commands, place(sent, commands, sent.length - 1))
+        return Motion(newest.v, newest.u)
+
+    @property
+    def shown(self) -> Motion | None:
+        """How the robot moves by the newest estimate; None where that is not tracking."""
+        known = self.known
+        if not known.known or known.status != Status.TRACKING or not known.sight.sound:
+            return None
+        return Motion(known.sight.v2, known.sight.u2)
 
     @property
     def receipts(self) -> tuple[Receipt, ...]:
@@ -230,6 +250,7 @@ class ControllerNode:
     def report(self, state: ControllerState, now_ns: int) -> Outgoing:
         """Diagnostics: what was decided how often, and what was refused."""
         known = state.known
+        state.answers = with_answer(state.answers, now_ns, state.asked, state.shown)
         problem = "" if known.heard else "waiting for estimates"
         values: dict[str, object] = {"estimate": Status(known.status).name.lower()}
         values |= _side_report(known.follower.station)
@@ -241,7 +262,7 @@ class ControllerNode:
 
     def findings(self, state: ControllerState, now_ns: int) -> Findings:
         """What is wrong with what the controller gets, as long as it is; reads rows, and takes no step."""
-        return {}
+        return answer_findings(state.answers, now_ns)
 
 
 def _side_report(station: StationState) -> dict[str, object]:

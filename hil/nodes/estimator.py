@@ -26,6 +26,8 @@ from hil.nodes.estimator_inputs import RESTARTED, SEEN, SET_BACK, TICK_NS
 from hil.nodes.estimator_memory import EstimatorMemory, node_rules
 from hil.nodes.estimator_records import AUTO, MOCAP, Known
 from hil.nodes.findings import Findings, named_findings
+from hil.nodes.frame_findings import bodies_text, clock_rule, frame_findings
+from hil.nodes.frame_looks import LOOK_NS, Look, look_at, names_in, recent, with_look
 from hil.nodes.frame_time import clock_report
 from hil.nodes.leader_findings import leader_findings
 from hil.nodes.leader_mount import UNWATCHED, LeaderMountWatch, with_leader
@@ -43,7 +45,7 @@ from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.certified_message import certified_message
 from hil.wire.events import Event
-from hil.wire.message_checks import planar
+from hil.wire.message_checks import Cause, planar
 from hil.wire.message_types import LeaderEstimate
 from hil.wire.messages import typename_of
 from hil.wire.reading import frame_reader
@@ -56,6 +58,7 @@ NAME = "estimator"
 _DIAGNOSTICS_NS = 500_000_000
 _ESTIMATE = typename_of(LeaderEstimate)
 _UNUSED = (GATED, DUPLICATE, LATE)
+FRAME_CAUSES = {cause.word for cause in Cause}
 
 
 @dataclass(slots=True, eq=False)
@@ -64,7 +67,8 @@ class EstimatorState:
 
     ``memory``: tracks, clock, receipts and counts, in rows. ``leader_mount``, ``sideways``: how the leader's
     body sits on it, and the follower's beside its wheels' middle, for a word. ``comparison``: how odometry
-    compares with mocap. ``believed``: what certificates rest on, if any are asked for.
+    compares with mocap. ``believed``: what certificates rest on, if any are asked for. ``looks``: at frames,
+    used or not, the newest of which came as ``looked_at``.
     """
 
     memory: EstimatorMemory
@@ -72,6 +76,9 @@ class EstimatorState:
     sideways: SidewaysCheck = NO_SIDEWAYS_CHECK
     comparison: OdometryComparison = NOTHING_SEEN
     believed: Believed = field(default_factory=Believed)
+    looks: tuple[Look, ...] = ()
+    looked_at: bytes = b""
+    next_look_ns: int = 0
     next_tick_ns: int = 0
     next_diagnostics_ns: int = 0
 
@@ -119,7 +126,9 @@ class EstimatorNode:
         self.topics = topics_of(scenario)
         leader, follower = bodies_of(scenario)
         self._reader = frame_reader(others | {leader, follower})
+        self._bodies = (leader, follower)
         self._wanted, self._leader_at = self._reader.pair(leader, follower), self._reader.names.index(leader)
+        self._clock_rule = clock_rule(scenario)
         self._leader_mount = leader_mount(scenario)
         self._template = estimate_template(self.topics.follower, MOST_RECEIPTS)
         self.rules = node_rules(scenario, self._template.numbers_at)
@@ -166,6 +175,8 @@ class EstimatorNode:
     def _on_frame(self, state: EstimatorState, event: Event, now_ns: int) -> int:
         memory = state.memory
         came = memory.see_frame(event.payload, event.signed_digest, now_ns)
+        if is_due(state.next_look_ns, LOOK_NS, now_ns):
+            self._look(state, event.payload, now_ns)
         if came != SEEN and not self._is_seen(state, came):
             return 0
         frame, body = memory.frame, load(Body, self._reader.bodies, self._leader_at)
@@ -188,6 +199,14 @@ class EstimatorNode:
                 state.believed, frame.capture_ns, leader, seen.follower
             )
         return length
+
+    def _look(self, state: EstimatorState, payload: bytes, now_ns: int) -> None:
+        """Look at the frame that was read just now, whether it is used or not."""
+        state.next_look_ns, state.looked_at = now_ns + LOOK_NS, payload
+        leader, follower = map(self._reader.names.index, self._bodies)
+        look = look_at(self._reader, payload, leader, follower, now_ns)
+        if look is not None:
+            state.looks = with_look(state.looks, look)
 
     def _on_sighting(self, state: EstimatorState, event: Event, now_ns: int) -> int:
         memory = state.memory
@@ -248,7 +267,7 @@ class EstimatorNode:
         """Diagnostics: status of the track, inputs taken and refused."""
         known = state.memory.known
         state.sideways = with_ways(state.sideways, state.memory.ways)
-        problem = "" if is_under_way(known, self.rules.step) else self._missing(known)
+        problem = "" if is_under_way(known, self.rules.step) else self._missing(state, known, now_ns)
         stops = self.rules.step.mounts.stops
         problem = problem or mount_problem(known.mount_check, stops=stops)
         values: dict[str, object] = {"status": state.memory.status(now_ns).name.lower()}
@@ -278,11 +297,29 @@ class EstimatorNode:
         mounts = mount_findings(known.mount_check, state.leader_mount.check, state.sideways)
         found = {**mounts, **odometry_findings(known, rules, now_ns)}
         found |= noise_findings(known.noise, rules.noise_learning)
-        return {**found, **leader_findings(known.travel, now_ns)}
+        found |= leader_findings(known.travel, now_ns)
+        if looks := recent(state.looks, now_ns):
+            found |= frame_findings(looks, self._clock_rule)
+            if looks[-1].pair is None and (wrong := bodies_text(self._bodies, names_in(state.looked_at))):
+                found["bodies"] = wrong
+        return found
 
-    def _missing(self, known: Known) -> str:
-        """What the estimator waits for to begin."""
-        seen = "sightings" if self.rules.sensor.used and known.own.length == 0 else "mocap"
+    def _missing(self, state: EstimatorState, known: Known, now_ns: int) -> str:
+        """What the estimator waits for to begin, and what of it is there."""
+        if self.rules.sensor.used and known.own.length == 0:
+            seen = f"sightings on {self.topics.sighting}"
+        else:
+            seen = f"mocap: {self._frames_missed(state, now_ns)}"
         if known.track.length == 0 and self.rules.step.source in (MOCAP, AUTO):
             return f"waiting for {seen}"
-        return f"waiting for {seen} and odometry"
+        return f"waiting for odometry on {self.topics.odom} and {seen}"
+
+    def _frames_missed(self, state: EstimatorState, now_ns: int) -> str:
+        looks = recent(state.looks, now_ns)
+        if not looks:
+            come = "no frame that can be read has" if state.looked_at else "no frame has"
+            return f"{come} come on {topics.RIGID_BODIES}"
+        if looks[-1].pair is None:
+            return bodies_text(self._bodies, names_in(state.looked_at))
+        refused = sorted(cause for cause in state.refused if cause in FRAME_CAUSES)
+        return f"frames come and are refused as {', '.join(refused)}" if refused else "frames come"

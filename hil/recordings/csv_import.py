@@ -2,112 +2,107 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 
-from formation.pose import Motion, Pose
-from hil.emulator.lab_messages import frame_message, odometry_message
-from hil.log.described_log import DescribedLog
-from hil.log.metadata import IMPORT, certificate_metadata, log_metadata
-from hil.recordings.column_map import ColumnMap
-from hil.recordings.csv_table import Row, read_table
-from hil.scenario.certificate import certificate_json, certificate_of
-from hil.wire import message_types as msg
-from hil.wire import topics
-from hil.wire.messages import encode, header, typename_of
-from hil.wire.topics import Topics, topics_of
+import numpy as np
 
-
-@dataclass(frozen=True, slots=True)
-class Imported:
-    """What an import gave: rows read, messages written, and the times [s] of the first and the last row.
-
-    ``torn``: number of a last line that was left out because the file ends in it, 0 for none.
-    """
-
-    rows: int
-    messages: int
-    from_s: float
-    to_s: float
-    torn: int = 0
+from formation.angles import FloatArray
+from hil.errors import UsageError
+from hil.recordings.body_tracks import turned_up
+from hil.recordings.column_map import ColumnMap, check_columns
+from hil.recordings.csv_table import Heading, Table, read_heading, read_table, told_unit
+from hil.recordings.imported import Imported, at_rate_of, imported, rate_of
+from hil.recordings.known_columns import known_columns
+from hil.recordings.pair_log import TRUTH, Recorded, planar_placements, write_pair
+from hil.recordings.text_file import Text, read_text
+from hil.scenario.files import with_overrides
 
 
 def import_csv(recording: Path, chart: ColumnMap, out: Path) -> Imported:
     """Write the rows of a CSV file to the new log ``out``. Stamps are the recording's own times.
 
-    Raises :class:`UsageError` as :func:`hil.recordings.csv_table.read_rows`, before anything is written, and
+    Raises :class:`UsageError` as :func:`hil.recordings.text_file.read_text` and :func:`import_columns`.
+    """
+    return import_columns(recording, read_text(recording), chart, out)
+
+
+def import_columns(recording: Path, text: Text, chart: ColumnMap, out: Path) -> Imported:
+    """Write the rows of a text that was read to the new log ``out``.
+
+    Raises :class:`UsageError` as :func:`hil.recordings.csv_table.read_table`, before anything is written, and
     if ``out`` exists or cannot be created. No half log is left behind.
     """
-    rows, torn = read_table(recording, chart)
-    names = topics_of(chart.scenario)
-    metadata = log_metadata(chart.scenario, IMPORT) | certificate_metadata(
-        certificate_json(certificate_of(chart.scenario, driven=False))
+    heading = read_heading(recording, text, chart.delimiter, chart.decimal)
+    if not chart.columns:
+        chart = _by_names(recording, heading, chart)
+    table = read_table(recording, text, heading, chart)
+    recorded = recorded_of(table, chart)
+    source = {"file": recording.name}
+    if chart.path is not None:
+        source["map"] = chart.path.name
+    scenario = chart.scenario if chart.path is not None else at_rate_of(recorded, chart.scenario)
+    messages = write_pair(out, recorded, scenario, source)
+    damage = (*text.damage, *(f"line {line} {fault}" for line, fault in table.damaged.items()))
+    return imported(recorded, scenario, messages, _taken_for(text, heading, table, chart), damage)
+
+
+def _by_names(recording: Path, heading: Heading, chart: ColumnMap) -> ColumnMap:
+    """The map of a table whose columns are known by their names."""
+    try:
+        known = known_columns(heading.names, heading.units)
+    except UsageError as error:
+        raise UsageError(f"recording {recording}: {error}") from None
+    found = replace(chart, columns=known.columns, truth=known.truth | chart.truth)
+    if found.sighted and chart.path is None:
+        found = replace(found, scenario=with_overrides(chart.scenario, {"estimator.front_end": "body"}))
+    check_columns(found, f"recording {recording}")
+    return found
+
+
+def _taken_for(text: Text, heading: Heading, table: Table, chart: ColumnMap) -> str:
+    """What a table was taken for, in a line."""
+    used = {name: source for name, source in chart.columns.items() if source.column is not None}
+    units = sorted({unit for name, source in used.items() if (unit := told_unit(heading, name, source))})
+    what = ", ".join(f"{name} = {source.column!r}" for name, source in used.items())
+    rates = f"{rate_of(table.t_ns):.4g} Hz"
+    moved = table.columns.get("v2")
+    if moved is not None and (rows := np.flatnonzero(np.isfinite(moved))).size > 1:
+        slower = rate_of(table.t_ns[rows])
+        rates += f", v2 and u2 at {slower:.4g} Hz" if slower < 0.9 * rate_of(table.t_ns) else ""
+    facts = ["table of columns", heading.layout.words, text.encoding, f"times in {table.times}"]
+    facts += [f"units {', '.join(units)}" if units else "SI units", f"{chart.up} up", rates, what]
+    return "; ".join(facts)
+
+
+def recorded_of(table: Table, chart: ColumnMap) -> Recorded:
+    """What a table has of a pair."""
+    given = table.columns
+    truth = None
+    if table.truth:
+        unknown = np.full(len(table.t_ns), np.nan)
+        truth = np.column_stack([table.truth.get(name, unknown) for name in TRUTH])
+    return Recorded(
+        t_ns=table.t_ns,
+        leader=_placements("leader", given, chart.up) if "leader_x" in given else None,
+        follower=_placements("follower", given, chart.up) if "follower_x" in given else None,
+        motion=np.column_stack([given["v2"], given["u2"]]) if "v2" in given else None,
+        sighting=np.column_stack([given["rho"], given["alpha2"]]) if "rho" in given else None,
+        truth=truth,
+        commanded=chart.commanded,
     )
-    metadata["source"] = {"file": recording.name, "map": chart.path.name}
-    with DescribedLog(out, metadata) as log:
-        try:
-            for number, row in enumerate(rows):
-                for topic, message in _messages(number, row, chart, names):
-                    log.write(topic, typename_of(message), encode(message), row.t_ns, row.t_ns)
-        except BaseException:
-            out.unlink(missing_ok=True)
-            raise
-    return Imported(len(rows), log.messages, rows[0].t_ns * 1e-9, rows[-1].t_ns * 1e-9, torn)
 
 
-def _messages(number: int, row: Row, chart: ColumnMap, names: Topics) -> Iterator[tuple[str, msg.Message]]:
-    """Messages of a row, in the order in which the robot had them."""
-    given = row.columns
-    measurement: list[tuple[str, msg.Message]] = []
-    if "rho" in given:
-        measurement = [_sighting(row, names)]
-    elif "leader_x" in given or "follower_x" in given:
-        measurement = [_frame(number, row, names)]
-    motion = [(names.odom, _odometry(row, names))] if "v2" in given else []
-    yield from [*measurement, *motion] if chart.commanded else [*motion, *measurement]
-    if row.truth:
-        yield topics.TRUTH, _truth(number, row)
-
-
-def _sighting(row: Row, names: Topics) -> tuple[str, msg.Message]:
-    stamp = header(row.t_ns, names.follower)
-    return names.sighting, msg.RangeBearing(stamp, row.columns["rho"], row.columns["alpha2"])
-
-
-def _frame(number: int, row: Row, names: Topics) -> tuple[str, msg.Message]:
-    given = row.columns
-    bodies: list[tuple[str, Pose]] = []
-    if "leader_x" in given:
-        leader = Pose(given["leader_x"], given["leader_y"], given.get("leader_theta", 0.0))
-        bodies.append((names.leader, leader))
-    if "follower_x" in given:
-        follower = Pose(given["follower_x"], given["follower_y"], given["follower_theta"])
-        bodies.append((names.follower, follower))
-    return topics.RIGID_BODIES, frame_message(row.t_ns, number, bodies)
-
-
-def _odometry(row: Row, names: Topics) -> msg.Odometry:
-    motion = Motion(row.columns["v2"], row.columns["u2"])
-    return odometry_message(row.t_ns, names.follower, Pose(0.0, 0.0, 0.0), motion)
-
-
-def _truth(number: int, row: Row) -> msg.Truth:
-    def known(name: str) -> float:
-        return row.truth.get(name, math.nan)
-
-    return msg.Truth(
-        header=header(row.t_ns, "world"),
-        frame_number=number,
-        leader_x=known("leader_x"),
-        leader_y=known("leader_y"),
-        leader_theta=known("leader_theta"),
-        v1=known("v1"),
-        u1=known("u1"),
-        follower_x=known("follower_x"),
-        follower_y=known("follower_y"),
-        follower_theta=known("follower_theta"),
-        v2=known("v2"),
-        u2=known("u2"),
-    )
+def _placements(role: str, given: dict[str, FloatArray], up: str) -> FloatArray:
+    """Poses of a robot: by its heading, by its quaternion, or without one."""
+    x, y = given[f"{role}_x"], given[f"{role}_y"]
+    level = np.zeros_like(x)
+    z = given.get(f"{role}_z", level)
+    if f"{role}_qw" in given:
+        quaternion = [given[f"{role}_q{axis}"] for axis in "xyzw"]
+        return turned_up(np.column_stack([x, y, z, *quaternion]), up)
+    if up == "y":
+        return turned_up(np.column_stack([x, y, z, level, level, level, level + 1.0]), up)
+    placements = planar_placements(x, y, given.get(f"{role}_theta", level))
+    placements[:, 2] = z
+    return placements

@@ -16,7 +16,7 @@ from formation.pose import Motion, Pose
 from hil.emulator.lab_messages import frame_message, odometry_message
 from hil.log.described_log import DescribedLog
 from hil.log.metadata import IMPORT, certificate_metadata, log_metadata
-from hil.recordings.csv_import import Imported
+from hil.recordings.imported import Imported
 from hil.recordings.mrclam_folder import Pair, Series, read_pair
 from hil.scenario.certificate import certificate_json, certificate_of
 from hil.scenario.files import load_scenario

@@ -90,7 +90,7 @@ def _course(
     if len(true):
         truth_table = table(data.seconds(truth.capture_ns[known]), true, {"y": true})
         draw_line(plot, truth_table, "y", TRUE)
-        keys.append(Key("truth", TRUE))
+        keys.append(Key(data.truth_name, TRUE))
         says += ", and as it was"
     bound = _bound(data, quantity.name) if judged else None
     if bound is not None:

@@ -66,7 +66,7 @@ def _panels(
     *,
     estimated: bool,
 ) -> list[Panel]:
-    colour, label = (BELIEVED, "estimate") if estimated else (TRUE, "truth")
+    colour, label = (BELIEVED, "estimate") if estimated else (TRUE, data.truth_name)
     driven = data.run_data.motion_since_ns is not None
     since, desired = data.desired()
     panels = []

@@ -35,15 +35,37 @@ A table in the place of a value is laid over the one that is there, unless it is
 def load_scenario(name_or_path: str, overrides: Overrides = ()) -> Scenario:
     """Read a scenario by its shipped name or from a TOML file, then apply ``section.key=value`` overrides.
 
-    Raises :class:`UsageError` for an unknown name, unreadable TOML, an unknown key (naming the nearest known
-    one), a wrong type, or a value out of range.
+    A file with a ``base``, the name of a scenario or a path to one from where the file is, says only what
+    differs from that. Raises :class:`UsageError` for an unknown name, unreadable TOML, an unknown key (naming
+    the nearest known one), a wrong type, or a value out of range.
     """
     path = locate("scenario", _FOLDER, name_or_path)
-    tree = read_toml(path, "scenario")
+    tree = _with_base(path, ())
     # A file's name may be none that UTF-8 can write.
     tree.setdefault("name", path.stem.encode(errors="replace").decode())
-    settle_references(tree, path.parent)
     return build_scenario(tree, overrides, source=f"scenario {path.stem}")
+
+
+def _with_base(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
+    """Tree of a scenario's file, laid over that of its base if it has one."""
+    tree = read_toml(path, "scenario")
+    settle_references(tree, path.parent)
+    if "base" not in tree:
+        return tree
+    source = f"scenario {path.stem}"
+    base = _base_name(tree.pop("base"), source)
+    beside = path.parent / base
+    below = beside if beside.is_file() else locate("scenario", _FOLDER, base)
+    if below.resolve() in above:
+        raise UsageError(f"{source}: base = {base!r} leads back to itself; expected another scenario")
+    under = _with_base(below, (*above, path.resolve()))
+    return _overlaid({key: each for key, each in under.items() if key not in ("name", "description")}, tree)
+
+
+def _base_name(base: object, source: str) -> str:
+    if not isinstance(base, str):
+        raise UsageError(f"{source}: base is {base!r}, expected the name of a scenario or a path to one")
+    return base
 
 
 def build_scenario(tree: Mapping[str, Any], *overrides: Overrides, source: str = "scenario") -> Scenario:
@@ -102,9 +124,7 @@ def merged_scenario(part: Mapping[str, Any], name: str, source: str) -> Scenario
     :func:`load_scenario` does, beginning with ``source``.
     """
     given = dict(part)
-    base = given.pop("base", _DEFAULT_BASE)
-    if not isinstance(base, str):
-        raise UsageError(f"{source}: base is {base!r}, expected the name of a scenario or a path to one")
+    base = _base_name(given.pop("base", _DEFAULT_BASE), source)
     tree = msgspec.to_builtins(load_scenario(base))
     merged = build_scenario(_overlaid(tree, {"name": name, "description": "", **given}), source=source)
     refuse_chain(merged, "a recording is of two robots; give base = the name of another scenario")

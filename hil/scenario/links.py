@@ -25,6 +25,9 @@ HOSTED = {
 }
 """The nodes that a daemon hosts for every follower, where it does."""
 
+STARTERS = ("emulator", "leader")
+"""The daemons that let the leader set off, and so wait for all others."""
+
 
 @dataclass(frozen=True, slots=True)
 class Link:

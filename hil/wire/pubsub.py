@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import queue
+import struct
 import threading
+import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -11,6 +14,7 @@ import zenoh
 
 from hil.wire.events import TICK, Event
 from hil.wire.key_layout import OURS, KeyLayout
+from hil.wire.ros_tokens import Endpoint, all_tokens, endpoint_in, endpoint_token, node_token
 from hil.wire.topics import STOP
 
 INBOX_LIMIT = 100_000
@@ -39,22 +43,52 @@ class Inbox:
             return None
 
 
+@dataclass(slots=True)
+class _Outlet:
+    """A publisher; ``gid``: what rmw_zenoh knows it by, empty where nobody asks; ``sent``: how many."""
+
+    publisher: zenoh.Publisher
+    gid: bytes
+    sent: int = 0
+
+    def put(self, payload: bytes) -> None:
+        if not self.gid:
+            self.publisher.put(payload)
+            return
+        self.sent += 1
+        # Without number, time and sender rmw_zenoh drops what it gets.
+        self.publisher.put(payload, attachment=attachment(self.sent, time.time_ns(), self.gid))
+
+
+def attachment(number: int, stamp_ns: int, gid: bytes) -> bytes:
+    """What rmw_zenoh has with every message: its number from 1 on, its time, and 16 bytes of its sender."""
+    return struct.pack("<qqB16s", number, stamp_ns, len(gid), gid)
+
+
 class Wire:
     """Subscriptions into one inbox, and publishers that are declared when first used.
 
-    ``urgent``: topics that go ahead of all others; ``layout``: the keys of topics.
+    ``urgent``: topics that go ahead of all others; ``layout``: the keys of topics. ``node``: the name under
+    which all this shows in the ROS graph; without one it does not.
     """
 
-    def __init__(self, session: zenoh.Session, urgent: Iterable[str] = (), layout: KeyLayout = OURS) -> None:
+    def __init__(
+        self, session: zenoh.Session, urgent: Iterable[str] = (), layout: KeyLayout = OURS, node: str = ""
+    ) -> None:
         self.inbox = Inbox()
         self._session = session
         self._urgent, self._layout = frozenset(urgent), layout
-        self._publishers: dict[str, zenoh.Publisher] = {}
+        self._outlets: dict[str, _Outlet] = {}
         self._subscribers: list[zenoh.Subscriber[None]] = []
+        self._tokens: list[zenoh.LivelinessToken] = []
+        self._graph: dict[str, Endpoint] = {}
         self._lock = threading.Lock()
+        self._node = f"abreast_{node}" if node else ""
+        if node:
+            self._show(node_token(layout, str(session.zid()), self._node))
 
-    def subscribe(self, topics: Iterable[str]) -> None:
-        """Let the payloads of the topics into the inbox.
+    def subscribe(self, topics: Iterable[str], *, shown: bool = True) -> None:
+        """Let the payloads of the topics into the inbox. ``shown``: in the ROS graph.
 
         Zenoh's own thread puts them there, not one for each topic, so that they lie in the order in which
         they came, over all topics. The callback must do nothing else: Zenoh itself would wait for it.
@@ -65,7 +99,9 @@ class Wire:
                 self.inbox.put(Event(topic, sample.payload.to_bytes()))
 
             direct = zenoh.handlers.Callback(keep, indirect=False)
-            self._subscribers.append(self._session.declare_subscriber(self._layout.key(topic), direct))
+            self._subscribers.append(self._session.declare_subscriber(self._layout.heard(topic), direct))
+            if shown:
+                self._show_endpoint(topic, publishes=False)
 
     def publish(self, topic: str, payload: bytes) -> None:
         """Send a payload; urgent topics go ahead of all others.
@@ -73,10 +109,30 @@ class Wire:
         A subscriber that cannot follow loses messages rather than holding up everybody else, but for a stop,
         which must arrive.
         """
-        publisher = self._publishers.get(topic)
-        if publisher is None:
-            publisher = self._declare(topic)
-        publisher.put(payload)
+        outlet = self._outlets.get(topic)
+        if outlet is None:
+            outlet = self._declare(topic)
+        outlet.put(payload)
+
+    def watch_graph(self) -> None:
+        """Begin to take down who publishes and who hears what, by everybody's tokens."""
+
+        def note(sample: zenoh.Sample) -> None:
+            token = str(sample.key_expr)
+            if sample.kind == zenoh.SampleKind.DELETE:
+                self._graph.pop(token, None)
+            elif (endpoint := endpoint_in(self._layout, token)) is not None:
+                self._graph[token] = endpoint
+
+        direct = zenoh.handlers.Callback(note, indirect=False)
+        watching = self._session.liveliness().declare_subscriber(
+            all_tokens(self._layout), direct, history=True
+        )
+        self._subscribers.append(watching)
+
+    def graph(self) -> tuple[Endpoint, ...]:
+        """Publishers and subscriptions of everybody, as far as they show in the ROS graph."""
+        return tuple(self._graph.copy().values())
 
     def wake(self) -> None:
         """Make a waiting :meth:`Inbox.take` return at once."""
@@ -84,29 +140,52 @@ class Wire:
 
     def close(self) -> None:
         """Take back all declarations; needed before the session is closed."""
+        for token in self._tokens:
+            token.undeclare()  # type: ignore[no-untyped-call]
         for subscriber in self._subscribers:
             subscriber.undeclare()  # type: ignore[no-untyped-call]
-        for publisher in self._publishers.values():
-            publisher.undeclare()  # type: ignore[no-untyped-call]
+        for outlet in self._outlets.values():
+            outlet.publisher.undeclare()  # type: ignore[no-untyped-call]
+        self._tokens.clear()
         self._subscribers.clear()
-        self._publishers.clear()
+        self._outlets.clear()
 
-    def _declare(self, topic: str) -> zenoh.Publisher:
+    def _declare(self, topic: str) -> _Outlet:
         with self._lock:
-            if (declared := self._publishers.get(topic)) is not None:
+            if (declared := self._outlets.get(topic)) is not None:
                 return declared
             return self._declared(topic)
 
-    def _declared(self, topic: str) -> zenoh.Publisher:
+    def _declared(self, topic: str) -> _Outlet:
         urgent = topic in self._urgent
         must_arrive = topic == STOP
         congestion = zenoh.CongestionControl.BLOCK if must_arrive else zenoh.CongestionControl.DROP
+        key = self._layout.key(topic)
         publisher = self._session.declare_publisher(
-            self._layout.key(topic),
+            key,
+            encoding=zenoh.Encoding.APPLICATION_CDR,
             # Alone in its packet; what many robots are told at once shares one, which halves what it costs.
             express=must_arrive,
             priority=zenoh.Priority.REAL_TIME if urgent else zenoh.Priority.DATA,
             congestion_control=congestion,
         )
-        self._publishers[topic] = publisher
-        return publisher
+        token = self._show_endpoint(topic, publishes=True)
+        told = token or f"{self._session.zid()}/{key}"
+        gid = hashlib.blake2b(told.encode(), digest_size=16).digest()
+        outlet = _Outlet(publisher, gid if self._layout.kind == "rmw_zenoh" else b"")
+        self._outlets[topic] = outlet
+        return outlet
+
+    def _show_endpoint(self, topic: str, *, publishes: bool) -> str:
+        """Show a publisher or a subscription in the ROS graph; its token, empty if it does not show."""
+        layout, kind = self._layout, self._layout.types.get(topic)
+        if kind is None or not self._node:
+            return ""
+        session, key = str(self._session.zid()), layout.within(layout.name(topic))
+        endpoint = Endpoint(session, publishes, key, kind, self._node)
+        token = endpoint_token(layout, len(self._tokens), topic, endpoint)
+        self._show(token)
+        return token
+
+    def _show(self, token: str) -> None:
+        self._tokens.append(self._session.liveliness().declare_token(token))

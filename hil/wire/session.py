@@ -75,6 +75,15 @@ def close_session(session: zenoh.Session) -> None:
     closer.join(_CLOSE_S)
 
 
+def reachable(listen: str) -> str:
+    """Where sessions on this machine connect to a router that listens there, be it on all interfaces.
+
+    >>> reachable("tcp/0.0.0.0:7447"), reachable("tcp/[::]:7447"), reachable("tcp/192.0.2.10:7447")
+    ('tcp/127.0.0.1:7447', 'tcp/[::1]:7447', 'tcp/192.0.2.10:7447')
+    """
+    return listen.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")
+
+
 @contextmanager
 def reserved_endpoint() -> Iterator[str]:
     """A loopback endpoint on a free port, which nobody else is given until one of us listens there.

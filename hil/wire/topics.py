@@ -135,7 +135,8 @@ def link_topics(link: Link) -> Topics:
 
 def urgent_topics(scenario: Scenario) -> tuple[str, ...]:
     """Topics that go ahead of all others: what robots are told to drive, and the stop."""
-    return (*(link_topics(link).cmd_vel for link in links_of(scenario)), STOP)
+    pairs = [link_topics(link) for link in links_of(scenario)]
+    return (pairs[0].leader_cmd_vel, *(pair.cmd_vel for pair in pairs), STOP)
 
 
 def types_of(scenario: Scenario) -> dict[str, str]:

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimation.calibration.smoothed_track import poses_at, smoothed_motion
+from estimation.calibration.smoothed_track import poses_at, smoothed_motion, travelled_motion
 from formation.angles import FloatArray, wrap
 from formation.pose import Pose, advance
 
@@ -65,3 +65,38 @@ def test_between_two_poses_a_heading_turns_the_short_way() -> None:
     (middle,) = poses_at(np.array([0, STEP_NS]), poses, np.array([STEP_NS // 2]))
     np.testing.assert_allclose(middle[:2], [0.5, 1.0])
     assert abs(abs(middle[2]) - np.pi) < 1e-9
+
+
+@given(
+    st.floats(0.05, 0.3), st.floats(-0.8, 0.8), st.floats(-3.1, 3.1), st.sampled_from([0.0, 1.5, 3.0, None])
+)
+def test_who_travels_is_told_by_its_travel_wherever_its_body_looks(
+    v: float, u: float, theta: float, aside: float | None
+) -> None:
+    stamps, poses = np.arange(200) * STEP_NS, arc(200, v, u, theta)
+    shown = poses.copy()
+    shown[:, 2] = np.nan if aside is None else wrap(poses[:, 2] + aside)
+    found = travelled_motion(stamps, shown, stamps, 0.02)
+    inner = slice(35, -35)
+    np.testing.assert_allclose(found.motion[inner], [[v, u]] * 130, atol=3e-3)
+    np.testing.assert_allclose(found.poses[inner, :2], poses[inner, :2], atol=1e-3)
+    np.testing.assert_allclose(wrap(found.poses[inner, 2] - poses[inner, 2]), 0.0, atol=5e-3)
+
+
+def test_a_body_that_is_carried_is_told_by_its_travel_though_it_turns_as_it_likes() -> None:
+    stamps, poses = np.arange(400) * STEP_NS, arc(400, 0.2, 0.3)
+    shown = poses.copy()
+    shown[:, 2] = wrap(2.0 * np.sin(3.0 * stamps * 1e-9))
+    found = travelled_motion(stamps, shown, stamps, 0.02)
+    np.testing.assert_allclose(found.motion[40:-40], [[0.2, 0.3]] * 320, atol=3e-3)
+
+
+def test_who_stands_looks_where_it_will_travel() -> None:
+    stamps = np.arange(300) * STEP_NS
+    way = np.maximum(0.0, 0.1 * (stamps * 1e-9 - 2.0))
+    poses = np.column_stack([way * np.cos(0.7), way * np.sin(0.7), np.full(300, np.nan)])
+    found = travelled_motion(stamps, poses, stamps, 0.02)
+    np.testing.assert_allclose(found.poses[20:-20, 2], 0.7, atol=1e-6)
+    np.testing.assert_allclose(found.motion[20:90, 0], 0.0, atol=1e-6)
+    standing = travelled_motion(stamps, np.zeros((300, 3)), stamps, 0.02)
+    assert np.isnan(standing.poses).all()

@@ -171,7 +171,7 @@ def test_garbage_is_counted_and_moves_nothing(topic: str, payload: bytes) -> Non
 def test_garbage_on_the_command_topic_is_counted() -> None:
     state, _ = told([(10, Event(NODE.topics.cmd_vel, b"\x01\x02\x03"))] * 3)
     assert state.refused == {"malformed": 3}
-    assert not state.commanded
+    assert not state.present.commanded
 
 
 def test_a_command_that_is_not_finite_stops_the_follower() -> None:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from hil.live.run import APART, FOLLOWERS_PER_PROCESS, TOGETHER, processes_of
+from hil.live.crew import APART, FOLLOWERS_PER_PROCESS, TOGETHER, processes_of
 from hil.scenario.files import load_scenario
 from hil.scenario.links import Link, links_of
 

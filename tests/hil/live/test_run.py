@@ -17,7 +17,7 @@ import pytest
 from formation.pose import Pose
 from hil.emulator.lab_messages import frame_message
 from hil.errors import UsageError
-from hil.live.run import APART, TOGETHER
+from hil.live.crew import APART, TOGETHER
 from hil.log.reader import read_log
 from hil.wire import message_types as msg
 from hil.wire import topics

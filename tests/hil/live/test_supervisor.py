@@ -8,15 +8,18 @@ from types import SimpleNamespace
 import pytest
 
 from hil.live import run
+from hil.live.crew import Crew
 from hil.live.run import STANDSTILL_TIMEOUT, _Supervisor
 from hil.live.run_monitor import Snapshot
 from hil.scenario.files import load_scenario
+from hil.scenario.links import links_of
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.messages import decode_as
 from hil.wire.topics import topics_of
 
-PAIR = topics_of(load_scenario("turtlebot3"))
+SCENARIO = load_scenario("turtlebot3")
+PAIR, LINKS = topics_of(SCENARIO), links_of(SCENARIO)
 
 
 class Lab:
@@ -52,7 +55,7 @@ def stopped(monkeypatch: pytest.MonkeyPatch) -> Callable[[Lab], float]:
     def stop(lab: Lab) -> float:
         monkeypatch.setattr(run, "time", lab)
         supervisor = object.__new__(_Supervisor)
-        supervisor.__dict__.update(_wire=lab, _monitor=lab, _children=lab, _pairs=[PAIR])
+        supervisor.__dict__.update(_wire=lab, _monitor=lab, _children=lab, _links=LINKS, _crew=Crew())
         supervisor._stop("enough")
         return lab.now
 

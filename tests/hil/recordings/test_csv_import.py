@@ -167,8 +167,8 @@ def test_a_measurement_rests_on_commands_before_it_and_on_odometry_up_to_it(
 
 def test_nothing_is_left_behind_by_a_recording_that_is_refused(driven: list[Truth], tmp_path: Path) -> None:
     path = table(driven, tmp_path / "lab.csv")
-    path.write_text(path.read_text() + "1,2,3\n")
-    with pytest.raises(UsageError, match="has 3 cells"):
+    path.write_text(path.read_text() + "1,2,3\n" * 200)
+    with pytest.raises(UsageError, match=r"line 722 has 3 cells.*200 of 920 lines"):
         imported(tmp_path, BODY_MAP, path)
     assert not (tmp_path / "lab.mcap").exists()
 

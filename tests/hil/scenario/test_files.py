@@ -18,7 +18,7 @@ from hil.scenario.files import (
     scenario_text,
     with_overrides,
 )
-from hil.scenario.schema import Scenario
+from hil.scenario.schema import ConstantProgram, Scenario
 
 TABLE = "leader.program={kind='table', t=[0.0, 1.0], v=[0.1, 'fast'], u=[0, 0]}"
 
@@ -157,3 +157,31 @@ def test_whatever_is_set_gives_a_sound_scenario_or_a_usage_error(overrides: list
         assert isinstance(scenario, Scenario)
         assert all(map(math.isfinite, scenario.leader.pose))
         assert scenario.formation.rho_0 > 0.0
+
+
+def test_a_file_with_a_base_says_what_differs(tmp_path: Path) -> None:
+    (tmp_path / "lab.toml").write_text('base = "turtlebot3"\n[leader]\nbody = 1\n[robot]\nlag_s = 0.2\n')
+    (tmp_path / "today.toml").write_text('base = "lab.toml"\n[leader.program]\nkind = "constant"\nv = 0.1\n')
+    lab, today = load_scenario(str(tmp_path / "lab.toml")), load_scenario(str(tmp_path / "today.toml"))
+    shipped = load_scenario("turtlebot3")
+    assert (lab.name, lab.leader.body, lab.robot.lag_s) == ("lab", 1, 0.2)
+    assert (lab.controller, lab.leader.program) == (shipped.controller, shipped.leader.program)
+    assert (today.name, today.leader.body) == ("today", 1)
+    assert today.leader.program == ConstantProgram(v=0.1)
+    (tmp_path / "resolved.toml").write_text(scenario_text(today))
+    assert load_scenario(str(tmp_path / "resolved.toml")) == today
+
+
+@pytest.mark.parametrize(
+    ("base", "said"),
+    [
+        ("3", "expected the name of a scenario"),
+        ('"lab.toml"', "leads back to itself"),
+        ('"nix"', "no such name"),
+    ],
+)
+def test_a_base_that_cannot_be_is_refused(tmp_path: Path, base: str, said: str) -> None:
+    path = tmp_path / "lab.toml"
+    path.write_text(f"base = {base}\n")
+    with pytest.raises(UsageError, match=said):
+        load_scenario(str(path))

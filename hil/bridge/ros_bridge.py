@@ -1,0 +1,145 @@
+"""The bridge to ROS 2: bytes from one side to the other, and who listens there."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from typing import Protocol
+
+from hil.bridge.ros_routes import Route
+from hil.live.finding_lines import FindingLines
+from hil.nodes.findings import named_findings
+from hil.nodes.listeners import listener_findings
+from hil.nodes.node import Outgoing, diagnostics, is_due, outgoing
+from hil.wire import topics
+from hil.wire.pubsub import Wire
+
+NAME = "bridge/ros2"
+_PERIOD_NS = 500_000_000
+_PATIENCE_NS = 1_500_000_000
+_PUMP_WAIT = 0.1
+_ECHO_S = 1.0
+
+
+class Graph(Protocol):
+    """The side of ROS 2."""
+
+    def spin(self, timeout: float) -> None:
+        """Hear what is there, at the latest after ``timeout`` [s]."""
+
+    def publish(self, topic: str, payload: bytes) -> None:
+        """Publish a message that is given as its bytes."""
+
+    def listeners(self, topic: str) -> list[str]:
+        """Types by which others listen to a topic that we publish, one for each."""
+
+    def close(self) -> None:
+        """Leave the graph."""
+
+
+class RosBridge:
+    """Carries the routes between the wire and a graph. ``say``: takes lines for the console.
+
+    What comes from ROS is published by whoever calls :meth:`take`; what goes there is by a thread of its
+    own, so that neither way waits for the other.
+    """
+
+    def __init__(
+        self,
+        wire: Wire,
+        routes: tuple[Route, ...],
+        make_graph: Callable[[Callable[[str, bytes], None]], Graph],
+        say: Callable[[str], None],
+    ) -> None:
+        self._wire, self._routes = wire, routes
+        self._types = {route.topic: route.typename for route in routes}
+        self._two_way = frozenset(route.topic for route in routes if route.way == "both")
+        self._echoes: dict[bytes, float] = {}
+        self._lock = threading.Lock()
+        self._heard: list[tuple[str, bytes]] = []
+        self._carried: Counter[str] = Counter()
+        self._begun_ns = self._report_ns = 0
+        self._say, self._findings, self._waits = say, FindingLines(say), ""
+        self._graph = make_graph(self._hear)
+        wire.subscribe(route.topic for route in routes if route.way != "in")
+        self._closing = False
+        self._pump = threading.Thread(target=self._carry_out, daemon=True)
+        self._pump.start()
+
+    def wait(self, timeout: float) -> None:
+        """Return when something has come from ROS, at the latest after ``timeout`` [s]."""
+        self._graph.spin(timeout)
+
+    def take(self, now_ns: int) -> Iterator[Outgoing]:
+        """What has come from ROS, and diagnostics when they are due."""
+        heard, self._heard = self._heard, []
+        for topic, payload in heard:
+            self._carried[topic] += 1
+            yield Outgoing(topic, self._types[topic], payload, now_ns)
+        self._begun_ns = self._begun_ns or now_ns
+        if is_due(self._report_ns, _PERIOD_NS, now_ns):
+            self._report_ns = now_ns + _PERIOD_NS
+            yield self._report(now_ns)
+
+    def end(self, now_ns: int) -> Iterator[Outgoing]:
+        """The last diagnostics."""
+        yield self._report(now_ns)
+
+    def close(self) -> None:
+        """Carry nothing any more, and leave the graph."""
+        self._closing = True
+        self._wire.wake()
+        self._pump.join()
+        self._graph.close()
+
+    def _hear(self, topic: str, payload: bytes) -> None:
+        if not self._is_echo(topic, payload):
+            self._heard.append((topic, payload))
+
+    def _carry_out(self) -> None:
+        while not self._closing:
+            event = self._wire.inbox.take(_PUMP_WAIT)
+            if event is not None and event.topic and not self._is_echo(event.topic, event.payload):
+                self._carried[event.topic] += 1
+                self._graph.publish(event.topic, event.payload)
+
+    def _is_echo(self, topic: str, payload: bytes) -> bool:
+        """Whether this very message of a two-way route was carried just now, be it the other way."""
+        if topic not in self._two_way:
+            return False
+        now = time.monotonic()
+        with self._lock:
+            before = self._echoes.get(payload, -_ECHO_S)
+            self._echoes = {each: at for each, at in self._echoes.items() if now - at < _ECHO_S}
+            self._echoes.setdefault(payload, now)
+        return now - before < _ECHO_S
+
+    def _report(self, now_ns: int) -> Outgoing:
+        """What was carried, who listens, and what is wrong with that."""
+        values: dict[str, object] = {f"carried.{topic}": count for topic, count in self._carried.items()}
+        silent = [
+            route.name
+            for route in self._routes
+            if route.way == "in" and not route.optional and not self._carried[route.topic]
+        ]
+        found: dict[str, list[str]] = {}
+        for route in self._routes:
+            if route.drives:
+                types = self._graph.listeners(route.topic)
+                values[f"listeners.{route.topic}"] = len(types)
+                for name, text in listener_findings(route.name, route.typename, types).items():
+                    found.setdefault(name, []).append(text)
+        begun = now_ns - self._begun_ns >= _PATIENCE_NS
+        findings = {name: "; ".join(texts) for name, texts in found.items() if begun}
+        problem = f"waiting for {', '.join(silent)}" if silent else ""
+        self._say_waiting(problem)
+        self._findings.note(NAME, findings)
+        told = diagnostics(NAME, now_ns, problem, values | named_findings(findings))
+        return outgoing(topics.DIAGNOSTICS, told, now_ns)
+
+    def _say_waiting(self, problem: str) -> None:
+        if problem != self._waits:
+            self._say(problem or "hears all that it waited for")
+            self._waits = problem

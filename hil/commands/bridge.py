@@ -1,0 +1,139 @@
+"""``abreast bridge``: motion captures of others, and ROS 2, brought to the wire."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
+
+import click
+
+from formation.collector import collector_paused
+from hil.bridge.up_axis import Up
+from hil.commands.daemon import DEFAULT_ENDPOINT
+from hil.commands.seconds import DURATION
+from hil.scenario.files import load_scenario
+from hil.scenario.schema import Scenario
+
+if TYPE_CHECKING:
+    from hil.bridge.bridging import Bridge
+    from hil.wire.pubsub import Wire
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_KINDS = ("vicon", "qualisys", "vrpn", "optitrack")
+_CONFIG = click.Path(path_type=Path, dir_okay=False)
+_ON_THE_WIRE = (
+    click.argument("scenario", default="turtlebot3"),
+    click.option("--connect", metavar="ENDPOINT", help=f"Router to connect to [{DEFAULT_ENDPOINT}]."),
+    click.option("--listen", metavar="ENDPOINT", help="Be the router, at this endpoint."),
+    click.option("--zenoh-config", type=_CONFIG, help="Zenoh config file, in place of both."),
+    click.option("--duration", type=DURATION, help="End after S seconds."),
+    click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key."),
+    click.option("--tethered", is_flag=True, hidden=True),
+)
+
+
+class _Given(TypedDict):
+    """Values of the options that all bridges have."""
+
+    scenario: str
+    connect: str | None
+    listen: str | None
+    zenoh_config: Path | None
+    duration: float | None
+    overrides: tuple[str, ...]
+    tethered: bool
+
+
+@click.group("bridge")
+def command() -> None:
+    """Bring what other systems send to the wire."""
+
+
+def _on_the_wire(function: F) -> F:
+    """Add the options that all bridges have."""
+    for option in reversed(_ON_THE_WIRE):
+        function = option(function)
+    return function
+
+
+@command.command("natnet")
+@_on_the_wire
+@click.option("--server", required=True, metavar="ADDR", help="Where Motive runs: HOST or HOST:PORT [1510].")
+@click.option("--multicast", is_flag=True, help="Join the multicast group even if Motive says unicast.")
+@click.option("--up", type=click.Choice(["y", "z"]), help="Motive's up axis [the scenario's source.up].")
+def bridge_natnet(server: str, multicast: bool, up: Up | None, **given: Unpack[_Given]) -> None:
+    """Publish the rigid bodies that OptiTrack's Motive streams, by the names of SCENARIO."""
+    with collector_paused():
+        from hil.bridge.datagram_sockets import address_of
+        from hil.bridge.mocap_wire import MocapWire
+        from hil.bridge.natnet_bridge import NatNetBridge, Server
+        from hil.bridge.natnet_packets import COMMAND_PORT
+
+    chosen = load_scenario(given["scenario"], given["overrides"])
+    place = Server(*address_of(server, COMMAND_PORT), multicast)
+    wire = MocapWire("bridge/natnet", chosen, up, _say)
+    _run(lambda _: NatNetBridge(place, wire, _say), chosen, given)
+
+
+@command.command("mocap")
+@_on_the_wire
+@click.option("--type", "kind", required=True, type=click.Choice(_KINDS), help="Which one it is.")
+@click.option("--server", required=True, metavar="ADDR", help="Where it runs: HOST or HOST:PORT.")
+@click.option("--up", type=click.Choice(["y", "z"]), help="Its up axis [the scenario's source.up].")
+def bridge_mocap(kind: str, server: str, up: Up | None, **given: Unpack[_Given]) -> None:
+    """Publish the bodies of a motion capture through the library motioncapture, by the names of SCENARIO."""
+    with collector_paused():
+        from hil.bridge.mocap_wire import MocapWire
+        from hil.bridge.motioncapture_bridge import MotionCaptureBridge, connector
+
+    chosen = load_scenario(given["scenario"], given["overrides"])
+    host, _, port = server.partition(":")
+    source, wire = connector(kind, host, port), MocapWire("bridge/mocap", chosen, up, _say)
+    _run(lambda _: MotionCaptureBridge(source, f"{kind} {server}", wire), chosen, given)
+
+
+@command.command("ros2")
+@_on_the_wire
+def bridge_ros2(**given: Unpack[_Given]) -> None:
+    """Join a ROS 2 network by rclpy: motion capture and odometry of SCENARIO in, commands out."""
+    with collector_paused():
+        from hil.bridge.ros_bridge import RosBridge
+        from hil.bridge.ros_graph import RosGraph, require_ros
+        from hil.bridge.ros_routes import routes_of
+
+    chosen = load_scenario(given["scenario"], given["overrides"])
+    routes, domain = routes_of(chosen), chosen.wire.domain or None
+    require_ros(routes)
+    _run(
+        lambda wire: RosBridge(wire, routes, lambda hear: RosGraph("abreast", domain, routes, hear), _say),
+        chosen,
+        given,
+    )
+
+
+def _run(make_bridge: Callable[[Wire], Bridge], scenario: Scenario, given: _Given) -> None:
+    """Run a bridge until it is told to end."""
+    with collector_paused():
+        from hil.bridge.bridging import run_bridge
+        from hil.live.daemon import Ending
+        from hil.wire.session import Endpoints
+
+    ending = Ending()
+    ending.on_signals()
+    if given["tethered"]:
+        ending.on_parent_gone()
+    connect, listen, config = given["connect"], given["listen"], given["zenoh_config"]
+    if not (connect or listen or config):
+        connect = DEFAULT_ENDPOINT
+    endpoints = Endpoints(connect, listen, config)
+
+    def say_ready() -> None:
+        _say(f"ready, {scenario.name} on {endpoints.describe()}")
+
+    run_bridge(make_bridge, scenario, endpoints, ending, given["duration"], say_ready)
+
+
+def _say(line: str) -> None:
+    click.echo(f"abreast bridge: {line}", err=True)

@@ -1,0 +1,70 @@
+"""``abreast stop``: stop all robots of a lab, and see that they are told so."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import click
+
+from hil.commands.daemon import DEFAULT_ENDPOINT
+
+_REPEAT_S = 0.1
+_TIMES = 5
+_PATIENCE_S = 2.0
+_LOOK_S = 0.3
+_CONFIG = click.Path(path_type=Path, dir_okay=False)
+
+
+@click.command("stop")
+@click.argument("reason", default="stopped by hand")
+@click.option("--scenario", default="turtlebot3", show_default=True, help="Whose robots: a name or a file.")
+@click.option("--connect", metavar="ENDPOINT", help=f"Router to connect to [{DEFAULT_ENDPOINT}].")
+@click.option("--zenoh-config", type=_CONFIG, help="Zenoh config file, in its place.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key.")
+def command(
+    reason: str, scenario: str, connect: str | None, zenoh_config: Path | None, overrides: tuple[str, ...]
+) -> None:
+    """Stop everybody for REASON: controllers by a stop message, and robots by a command to stand.
+
+    Ends with 0 once all robots are told to stand and nobody tells one otherwise, else with 1.
+    """
+    from hil.live.lab_state import LabState, hear_for
+    from hil.nodes.link_nodes import leader_standstill, standstill
+    from hil.scenario.files import load_scenario
+    from hil.scenario.links import links_of
+    from hil.wire import topics
+    from hil.wire.key_layout import layout_of
+    from hil.wire.message_types import String
+    from hil.wire.messages import encode
+    from hil.wire.pubsub import Wire
+    from hil.wire.session import Endpoints, close_session, open_session
+    from hil.wire.topics import urgent_topics
+
+    chosen = load_scenario(scenario, overrides)
+    state, links = LabState(chosen), links_of(chosen)
+    endpoints = Endpoints(None if zenoh_config else connect or DEFAULT_ENDPOINT, None, zenoh_config)
+    session = open_session(endpoints, patience=3.0)
+    wire = Wire(session, urgent_topics(chosen), layout_of(chosen), "stop")
+    clock = time.monotonic
+    try:
+        wire.subscribe(state.robots, shown=False)
+        for _ in range(_TIMES):
+            wire.publish(topics.STOP, encode(String(data=reason)))
+            now_ns = time.time_ns()
+            for still in (leader_standstill(chosen, now_ns), *(standstill(link, now_ns) for link in links)):
+                wire.publish(still.topic, still.payload)
+            hear_for(state, wire.inbox.take, clock, clock() + _REPEAT_S)
+        until = clock() + _PATIENCE_S
+        while (driven := state.driven(clock())) and clock() < until:
+            hear_for(state, wire.inbox.take, clock, clock() + _LOOK_S)
+    finally:
+        wire.close()
+        close_session(session)
+    if driven:
+        click.echo(
+            f"abreast stop: somebody still drives {', '.join(driven)}; use the robot's switch", err=True
+        )
+        sys.exit(1)
+    click.echo(f"abreast stop: {', '.join(state.robots.values())} told to stand ({reason})", err=True)

@@ -1,0 +1,209 @@
+"""What passes on a lab's wire just now: daemons, bodies, robots, and who told whom to drive."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from hil.nodes.findings import PREFIX, findings_in, findings_json
+from hil.scenario.links import links_of
+from hil.scenario.schema import Scenario
+from hil.wire import message_types as msg
+from hil.wire import topics
+from hil.wire.events import Event
+from hil.wire.messages import MalformedPayloadError, decode_as
+from hil.wire.source_topics import all_bodies, source_topics
+from hil.wire.topics import link_topics
+
+_RATE_OVER_S = 2.0
+_QUIET_S = 0.25
+_REFUSED = "refused."
+
+
+@dataclass(slots=True)
+class Heard:
+    """When something was heard, by a clock in seconds: last, and within the last moments."""
+
+    times: list[float] = field(default_factory=list)
+
+    def note(self, now: float) -> None:
+        """It was heard now."""
+        self.times.append(now)
+        if len(self.times) > 64 and self.times[len(self.times) // 2] < now - _RATE_OVER_S:
+            self.times = [each for each in self.times if each >= now - _RATE_OVER_S]
+
+    def age_s(self, now: float) -> float:
+        """How long ago it was heard last."""
+        return now - self.times[-1]
+
+    def rate_hz(self, now: float) -> float:
+        """How often a second it has been heard of late."""
+        late = [each for each in self.times if each >= now - _RATE_OVER_S]
+        return (len(late) - 1) / (late[-1] - late[0]) if len(late) > 1 and late[-1] > late[0] else 0.0
+
+
+@dataclass(slots=True)
+class Drive:
+    """What a robot was last told to drive: v [m/s], u [rad/s]."""
+
+    v: float
+    u: float
+
+    @property
+    def still(self) -> bool:
+        """Whether it is told to stand."""
+        return self.v == 0.0 and self.u == 0.0
+
+
+class LabState:
+    """The newest of everything that is heard, by the topics of a scenario."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        pairs = [link_topics(link) for link in links_of(scenario)]
+        self._stamped = pairs[0].stamped
+        names = (scenario.leader.name, *(link.follower for link in links_of(scenario)))
+        drives = (pairs[0].leader_cmd_vel, *(pair.cmd_vel for pair in pairs))
+        wheels = (pairs[0].leader_odom, *(pair.odom for pair in pairs))
+        self.robots = dict(zip(drives, names, strict=True))
+        self._wheels = dict(zip(names, wheels, strict=True))
+        self.wanted = all_bodies(scenario)
+        self.topics = (
+            topics.DIAGNOSTICS,
+            topics.STOP,
+            topics.RIGID_BODIES,
+            *source_topics(scenario),
+            *self.robots,
+            *self._wheels.values(),
+        )
+        self._heard: dict[str, Heard] = {}
+        self._bodies: dict[str, Heard] = {}
+        self._daemons: dict[str, tuple[Heard, msg.DiagnosticStatus]] = {}
+        self.drives: dict[str, Drive] = {}
+        self._driven_at: dict[str, float] = {}
+        self.stops: list[str] = []
+        self.malformed = 0
+
+    def hear(self, event: Event, now: float) -> None:
+        """Take in a message at a time of a clock in seconds; what cannot be read is counted."""
+        self._heard.setdefault(event.topic, Heard()).note(now)
+        try:
+            if event.topic == topics.DIAGNOSTICS:
+                for status in decode_as(event.payload, msg.DiagnosticArray).status:
+                    heard, _ = self._daemons.get(status.name, (Heard(), status))
+                    heard.note(now)
+                    self._daemons[status.name] = heard, status
+            elif event.topic == topics.RIGID_BODIES:
+                for body in decode_as(event.payload, msg.RigidBodies).rigidbodies:
+                    self._bodies.setdefault(body.rigid_body_name, Heard()).note(now)
+            elif event.topic == topics.STOP:
+                self.stops = [*self.stops[-9:], decode_as(event.payload, msg.String).data]
+            elif event.topic in self.robots:
+                drive = self.drives[event.topic] = self._drive(event.payload)
+                if not drive.still:
+                    self._driven_at[event.topic] = now
+        except MalformedPayloadError:
+            self.malformed += 1
+
+    def _drive(self, payload: bytes) -> Drive:
+        stamped = decode_as(payload, msg.TwistStamped).twist if self._stamped else None
+        twist = stamped or decode_as(payload, msg.Twist)
+        return Drive(twist.linear.x, twist.angular.z)
+
+    def driven(self, now: float) -> list[str]:
+        """Robots that were told nothing, or of late to drive: several may tell them in turn."""
+        return [
+            name
+            for topic, name in self.robots.items()
+            if topic not in self.drives or now - self._driven_at.get(topic, -math.inf) < _QUIET_S
+        ]
+
+    def as_dict(self, now: float) -> dict[str, Any]:
+        """All of it, as results have it; ages in seconds."""
+        return {
+            "daemons": [self._daemon(name, now) for name in sorted(self._daemons)],
+            "bodies": [
+                {"name": name, **_when(heard, now), "wanted": name in self.wanted}
+                for name, heard in sorted(self._bodies.items())
+            ],
+            "missing_bodies": [name for name in self.wanted if name not in self._bodies],
+            "robots": [self._robot(topic, name, now) for topic, name in self.robots.items()],
+            "stops": self.stops,
+            "malformed": self.malformed,
+        }
+
+    def _daemon(self, name: str, now: float) -> dict[str, Any]:
+        heard, status = self._daemons[name]
+        values = {each.key: each.value for each in status.values if not each.key.startswith(PREFIX)}
+        refused = {
+            key.removeprefix(_REFUSED): int(value)
+            for key, value in values.items()
+            if key.startswith(_REFUSED) and value.isdigit()
+        }
+        report = msg.DiagnosticArray(header=_NO_HEADER, status=[status])
+        (found,) = findings_in(report).values()
+        return {
+            "name": name.removeprefix("abreast/"),
+            "age_s": round(heard.age_s(now), 2),
+            "ok": int(status.level) == 0,
+            "says": status.message,
+            "status": values.get("status", ""),
+            "refused": refused,
+            "findings": findings_json(found),
+        }
+
+    def _robot(self, topic: str, name: str, now: float) -> dict[str, Any]:
+        drive, told = self.drives.get(topic), self._heard.get(topic)
+        wheels = self._heard.get(self._wheels[name])
+        return {
+            "name": name,
+            "told": {"v": drive.v, "u": drive.u, **_when(told, now)} if drive and told else None,
+            "odometry": _when(wheels, now) if wheels else None,
+        }
+
+
+def hear_for(
+    state: LabState, take: Callable[[float], Event | None], clock: Callable[[], float], until: float
+) -> None:
+    """Let a state hear what is taken until a time of the clock."""
+    while (left := until - clock()) > 0.0:
+        event = take(left)
+        if event is not None and event.topic:
+            state.hear(event, clock())
+
+
+def told_lines(state: LabState, now: float) -> Iterable[tuple[str, str, str]]:
+    """Rows for a terminal: what it is, how old and how often, and what there is to say of it."""
+    told = state.as_dict(now)
+    for each in told["daemons"]:
+        refused = ", ".join(f"{count} {cause}" for cause, count in each["refused"].items())
+        parts = [each["status"], each["says"], f"refused: {refused}" if refused else ""]
+        yield each["name"], f"{each['age_s']:.1f} s", "; ".join(filter(None, parts))
+        for finding in each["findings"]:
+            yield "", "", f"{finding['name']}: {finding['text']}"
+    for each in told["bodies"]:
+        yield f"body {each['name']}", _age(each), "" if each["wanted"] else "nobody asks for it"
+    for name in told["missing_bodies"]:
+        yield f"body {name}", "-", "not seen"
+    for each in told["robots"]:
+        drive = each["told"]
+        says = f"told v {drive['v']:+.3f} m/s, u {drive['u']:+.2f} rad/s" if drive else "told nothing"
+        yield f"robot {each['name']}", _age(drive) if drive else "-", says
+        if each["odometry"] is None:
+            yield "", "", "no odometry"
+        else:
+            yield "", _age(each["odometry"]), "odometry"
+    for reason in told["stops"][-1:]:
+        yield "stop", "", reason
+
+
+def _when(heard: Heard, now: float) -> dict[str, float]:
+    return {"age_s": round(heard.age_s(now), 3), "rate_hz": round(heard.rate_hz(now), 1)}
+
+
+def _age(when: dict[str, float]) -> str:
+    return f"{when['age_s']:.1f} s, {when['rate_hz']:.0f} Hz"
+
+
+_NO_HEADER = msg.Header(stamp=msg.Time(sec=0, nanosec=0), frame_id="")

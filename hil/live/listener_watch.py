@@ -1,0 +1,67 @@
+"""Who listens to the commands of our robots, as the tokens of the ROS graph tell it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+from hil.nodes.findings import Findings, named_findings
+from hil.nodes.listeners import listener_findings
+from hil.nodes.node import Outgoing, diagnostics, is_due, outgoing
+from hil.wire import topics
+from hil.wire.key_layout import KeyLayout
+from hil.wire.pubsub import Wire
+
+_PERIOD_NS = 500_000_000
+_PATIENCE_NS = 1_000_000_000
+
+
+class Commanded(NamedTuple):
+    """A robot that we drive. ``node``: what its findings are reported by."""
+
+    node: str
+    cmd_vel: str
+    odom: str
+
+
+class ListenerWatch:
+    """Reports, while something is wrong, on the robots that tell of themselves in the ROS graph.
+
+    One whose odometry has no token there may listen without a token too: of that nothing is said.
+    """
+
+    def __init__(
+        self, wire: Wire, layout: KeyLayout, robots: Sequence[Commanded], hear: Callable[[bytes], None]
+    ) -> None:
+        self._wire, self._layout, self._robots, self._hear = wire, layout, robots, hear
+        self._since_ns: dict[str, int] = {}
+        self._found: dict[str, Findings] = {}
+        self._due_ns = 0
+        wire.watch_graph()
+
+    def reports(self, now_ns: int) -> Iterator[Outgoing]:
+        """What there is to say, when it is due."""
+        if not is_due(self._due_ns, _PERIOD_NS, now_ns):
+            return
+        self._due_ns = now_ns + _PERIOD_NS
+        for robot in self._robots:
+            found = self._findings(robot, now_ns)
+            if found or self._found.get(robot.node):
+                report = diagnostics(robot.node, now_ns, "; ".join(found.values()), named_findings(found))
+                said = outgoing(topics.DIAGNOSTICS, report, now_ns)
+                self._hear(said.payload)
+                yield said
+            self._found[robot.node] = found
+
+    def _findings(self, robot: Commanded, now_ns: int) -> Findings:
+        """What is wrong and has been for a second: robots come up one topic after the other."""
+        layout, graph = self._layout, self._wire.graph()
+        told, odom = layout.within(layout.name(robot.cmd_vel)), layout.within(layout.name(robot.odom))
+        found: Findings = {}
+        if any(each.publishes and each.key == odom for each in graph):
+            heard_as = [each.typename for each in graph if not each.publishes and each.key == told]
+            found = listener_findings(f"/{layout.name(robot.cmd_vel)}", layout.types[robot.cmd_vel], heard_as)
+        since_ns = self._since_ns.setdefault(robot.node, now_ns) if found else now_ns
+        if not found:
+            self._since_ns.pop(robot.node, None)
+        return found if now_ns - since_ns >= _PATIENCE_NS else {}

@@ -1,0 +1,110 @@
+"""The bridge to ROS 2 against robots and a motion capture in rclpy."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from hil.nodes.findings import findings_in
+from hil.wire import message_types as msg
+from hil.wire.messages import decode_as, encode, header
+from hil.wire.pubsub import Wire
+from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
+from tests.real.ros_lab import Lab, bridge, standing
+
+pytestmark = pytest.mark.slow
+
+
+@contextmanager
+def router() -> Iterator[tuple[str, Wire]]:
+    with reserved_endpoint() as endpoint:
+        session = open_session(Endpoints(listen=endpoint))
+        wire = Wire(session)
+        try:
+            yield endpoint, wire
+        finally:
+            wire.close()
+            close_session(session)
+
+
+def twist(v: float, u: float) -> msg.Twist:
+    return msg.Twist(linear=msg.Vector3(x=v, y=0.0, z=0.0), angular=msg.Vector3(x=0.0, y=0.0, z=u))
+
+
+def drive(lab: Lab, wire: Wire, topic: str, seconds: float) -> dict[str, list[bytes]]:
+    """Tell the follower to drive, and take down what comes."""
+    heard: dict[str, list[bytes]] = {}
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        asked: msg.Message = twist(0.1, 0.2)
+        if lab.command_types[1] == "TwistStamped":
+            asked = msg.TwistStamped(header=header(time.time_ns(), "follower"), twist=twist(0.1, 0.2))
+        wire.publish(topic, encode(asked))
+        while (event := wire.inbox.take(0.02)) is not None:
+            heard.setdefault(event.topic, []).append(event.payload)
+    return heard
+
+
+@pytest.mark.parametrize(
+    "lab",
+    [
+        Lab(domain=91),
+        Lab(domain=92, namespaces=("tb3_1", ""), command_types=("Twist", "Twist")),
+    ],
+    ids=["namespaced TwistStamped", "follower without namespace, Twist"],
+)
+def test_frames_and_odometry_come_in_and_commands_go_out(lab: Lab, peers: Path) -> None:
+    leader, follower = (f"{name}/" if name else "" for name in lab.namespaces)
+    with router() as (endpoint, wire), standing(lab, peers) as (robots, _), bridge(lab, endpoint, peers):
+        wire.subscribe([lab.topic, f"{leader}odom", f"{follower}odom", "diagnostics"])
+        heard = drive(lab, wire, f"{follower}cmd_vel", 4.0)
+        robots.finish()
+    frame = decode_as(heard[lab.topic][-1], msg.RigidBodies)
+    assert tuple(body.rigid_body_name for body in frame.rigidbodies) == lab.bodies
+    assert len(heard[lab.topic]) > 200
+    own = decode_as(heard[f"{follower}odom"][-1], msg.Odometry)
+    assert own.twist.twist.linear.x == pytest.approx(0.1, abs=0.01)
+    assert own.twist.twist.angular.z == pytest.approx(0.2, abs=0.01)
+    assert f"{leader}odom" in heard
+    report = decode_as(heard["diagnostics"][-1], msg.DiagnosticArray)
+    assert findings_in(report) == {"bridge/ros2": {}}
+
+
+@pytest.mark.parametrize(
+    ("lab", "finding"),
+    [
+        (Lab(domain=93, listens=(True, False)), "deaf_robot"),
+        (Lab(domain=94, command_types=("TwistStamped", "Twist")), "command_type"),
+    ],
+    ids=["deaf", "another type"],
+)
+def test_a_robot_that_does_not_listen_is_named(lab: Lab, finding: str, peers: Path) -> None:
+    takes_stamped = Lab(domain=lab.domain)
+    with router() as (endpoint, wire), standing(lab, peers), bridge(takes_stamped, endpoint, peers) as ours:
+        wire.subscribe(["diagnostics"])
+        said = ours.wait_for(f"finds {finding}")
+        assert "/follower/cmd_vel" in said
+        until = time.monotonic() + 10.0
+        found: dict[str, str] = {}
+        while finding not in found and time.monotonic() < until:
+            if (event := wire.inbox.take(1.0)) is not None:
+                found = findings_in(decode_as(event.payload, msg.DiagnosticArray))["bridge/ros2"]
+        assert set(found) == {finding}
+
+
+def test_a_stop_goes_both_ways_once(peers: Path) -> None:
+    """An operator's stop in ROS reaches our daemons, and ours reaches ROS; neither goes in a circle."""
+    lab = Lab(domain=95)
+    with router() as (endpoint, wire), bridge(lab, endpoint, peers) as ours:
+        wire.subscribe(["stop", "diagnostics"])
+        wire.publish("stop", encode(msg.String(data="by hand")))
+        stops, until = [], time.monotonic() + 3.0
+        while time.monotonic() < until:
+            if (event := wire.inbox.take(0.1)) is not None and event.topic == "stop":
+                stops.append(event.payload)
+        assert len(stops) == 1
+        assert ours.process.poll() is None
