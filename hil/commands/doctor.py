@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -101,17 +102,19 @@ def _visited(
     wire = Wire(session, urgent_topics(scenario), layout_of(scenario), "doctor")
     try:
         yield route_check(endpoints.describe(), "")
-        visit = Visit(scenario, wire)
-        robot = visit.robot(drive) if drive else None
+        visit, layout = Visit(scenario, wire), layout_of(scenario)
+        examination = visit.examination
+        robot = examination.robot(drive) if drive else None
         click.echo(f"abreast doctor: listens for {duration:g} s", err=True)
         visit.listen(duration)
-        passive = list(visit.checks())
+        driven = []
         if robot is not None:
             countdown(lambda line: click.echo(f"abreast doctor: {line}", err=True), robot)
-            driven = visit.drive(robot)
-            passive = [*visit.checks(), *driven]
-        findings += visit.findings()
-        yield from passive
+            driven = examination.drive(robot, visit.tell)
+        now_ns = time.time_ns()
+        findings += examination.findings(now_ns)
+        yield from examination.checks(wire.graph(), layout, now_ns)
+        yield from driven
     finally:
         wire.close()
         close_session(session)

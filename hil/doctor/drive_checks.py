@@ -15,6 +15,9 @@ from hil.doctor.check import Check, check
 from hil.doctor.evidence import Evidence, Robot
 from hil.nodes.findings import advice_on
 
+Span = tuple[int, int]
+"""Begin and end of a span of time [ns]."""
+
 CREEP, TURN = Motion(0.05, 0.0), Motion(0.0, 0.3)
 """What a robot is told: at most 0.05 m/s and 0.3 rad/s."""
 CREEP_S, TURN_S, REST_S = 3.0, 3.0, 0.8
@@ -65,9 +68,7 @@ def moved(found: Evidence, robot: Robot, from_ns: int, to_ns: int) -> Moved | No
     return Moved(poses[0], poses[-1], way, turn)
 
 
-def drive_checks(
-    found: Evidence, robot: Robot, ahead: tuple[int, int], around: tuple[int, int]
-) -> Iterator[Check]:
+def drive_checks(found: Evidence, robot: Robot, ahead: Span, around: Span) -> Iterator[Check]:
     """Checks of a robot that was told :data:`CREEP` and :data:`TURN` in these spans of time [ns]."""
     straight, turning = moved(found, robot, *ahead), moved(found, robot, *around)
     others = [each for each in found.robots if each != robot]
@@ -84,7 +85,7 @@ def drive_checks(
     yield _pivot(robot, turning)
 
 
-def _answers(found: Evidence, robot: Robot, others: list[Robot], ahead: tuple[int, int]) -> Check:
+def _answers(found: Evidence, robot: Robot, others: list[Robot], ahead: Span) -> Check:
     """Whether the body moved that was to move, and none else."""
     own = moved(found, robot, *ahead)
     went = own.distance if own is not None else 0.0
