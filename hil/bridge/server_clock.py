@@ -108,7 +108,9 @@ class ServerClock:
         expected_ns = self._offset_ns + round(self.drift * (echo.middle_ns - self._at_ns))
         # Far off in host time the drift alone may have moved it.
         allowed_ns = _JUMP_NS + _DRIFT_SD * abs(echo.middle_ns - self._at_ns)
-        return abs(echo.offset_ns - expected_ns) <= allowed_ns + 0.5 * echo.round_trip_ns
+        # What is known so far is itself right to half a round trip only.
+        allowed_ns += 0.5 * (echo.round_trip_ns + self.round_trip_ns)
+        return abs(echo.offset_ns - expected_ns) <= allowed_ns
 
     def _keep(self, echo: Answered) -> None:
         second = echo.middle_ns // _S_NS

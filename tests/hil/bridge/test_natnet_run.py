@@ -60,7 +60,6 @@ def test_by_natnet_the_pair_drives_as_it_does_without(tmp_path: Path) -> None:
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=PATIENCE,
         check=True,
     )
     summary = json.loads(judged.stdout)

@@ -65,6 +65,16 @@ def test_the_first_echo_is_right_to_half_its_round_trip() -> None:
     assert abs(clock.host_ns(ticks_at(T0 + MS)) - (T0 + MS)) <= 2 * MS
 
 
+def test_a_quick_echo_after_a_slow_first_one_is_believed_at_once() -> None:
+    clock = ServerClock(FREQUENCY)
+    clock.hear(T0, T0 + 160 * MS, ticks_at(T0 + 159 * MS))
+    at = T0 + 200 * MS
+    assert abs(clock.host_ns(ticks_at(at)) - at) == pytest.approx(79 * MS, abs=MS)
+    clock.hear(at, at + 200_000, ticks_at(at + 100_000))
+    assert abs(clock.host_ns(ticks_at(at)) - at) < 20_000
+    assert clock.jumps == 0
+
+
 def test_slow_echoes_among_quick_ones_do_no_harm() -> None:
     clock, now = synchronised(0.0, (0.1, 0.0))
     for k in range(1, 20):
