@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from hil.live.daemon import Ending, Worker
     from hil.live.listener_watch import ListenerWatch
     from hil.live.node_worker import Parting
+    from hil.nodes.node import Node
     from hil.wire.pubsub import Wire
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -169,6 +170,8 @@ def _emulator(order: Order) -> Worker:
     from hil.wire import topics
     from hil.wire.source_topics import converts
 
+    if order.scenario.source.emulated:
+        return _beside_real(order)
     node = EmulatorNode(order.scenario, order.needs)
     if order.natnet.natnet:
         from hil.bridge.natnet_emulator import NatNetEmulator
@@ -181,6 +184,15 @@ def _emulator(order: Order) -> Worker:
     frames = (topics.RIGID_BODIES,)
     foreign = ForeignMocapNode(order.scenario)
     return NodeWorker([node, foreign], within=frames, on_report=_on_report(), unspoken=frames)
+
+
+def _beside_real(order: Order) -> Worker:
+    from hil.emulator.beside_real import LAB_FRAMES, BesideReal
+    from hil.live.node_worker import NodeWorker
+    from hil.nodes.source import SourceNode
+
+    nodes: list[Node[Any]] = [SourceNode(order.scenario, LAB_FRAMES), BesideReal(order.scenario, order.needs)]
+    return NodeWorker(nodes, within=(LAB_FRAMES,), on_report=_on_report(), unspoken=(LAB_FRAMES,))
 
 
 def _serve_alone(order: Order, ending: Ending, duration_s: float | None) -> None:

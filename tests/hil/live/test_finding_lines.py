@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from hil.live.finding_lines import FindingLines
+from hil.live.finding_lines import FindingLines, WaitingLines
 from hil.nodes.findings import advice_on, named_findings
 from hil.nodes.node import diagnostics
 from hil.wire.messages import encode
@@ -38,3 +38,11 @@ def test_what_cannot_be_read_is_passed_over() -> None:
     lines = FindingLines(said.append)
     lines.hear(b"finding.")
     assert said == []
+
+
+def test_what_a_start_waits_for_is_said_once_however_many_seconds_are_left() -> None:
+    said: list[str] = []
+    lines = WaitingLines(said.append)
+    for waits in ("waiting for a command", "waiting for a command", "sets off in 2.5 s", "sets off in 2.0 s"):
+        lines.hear(waits)
+    assert said == ["waiting for a command", "sets off in 2.5 s"]
