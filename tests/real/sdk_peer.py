@@ -21,7 +21,9 @@ VECTOR, TWIST = "float64 x\nfloat64 y\nfloat64 z\n", "Vector3 linear\nVector3 an
 
 
 def say(**told: Any) -> None:
-    print(json.dumps(told), flush=True)
+    # In one piece: callbacks of several threads say something.
+    sys.stdout.write(json.dumps(told) + "\n")
+    sys.stdout.flush()
 
 
 def hash_of(share: str, typename: str) -> str:

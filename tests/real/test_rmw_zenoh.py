@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
@@ -18,7 +20,7 @@ from hil.wire.messages import encode, rihs01
 from hil.wire.pubsub import Wire
 from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
 from hil.wire.topics import types_of
-from tests.real.ros_lab import HERE, Peer, peer
+from tests.real.ros_lab import HERE, ROOT, Peer, peer
 
 pytestmark = pytest.mark.slow
 
@@ -109,3 +111,19 @@ def test_hashes_of_types_are_those_of_ros(peers: Path) -> None:
     assert {typename: rihs01(typename) for typename in known} == {
         typename: told[typename] for typename in known
     }
+
+
+def test_ros_reads_every_message_of_our_package(peers: Path) -> None:
+    package = ROOT / "ros" / "abreast_msgs" / "msg"
+    read = (
+        "import sys; from rosidl_adapter.parser import parse_message_file\n"
+        "for path in sys.argv[1:]: print(len(parse_message_file('abreast_msgs', path).fields))"
+    )
+    paths = sorted(map(str, package.glob("*.msg")))
+    done = subprocess.run([str(peers), "-c", read, *paths], capture_output=True, text=True, check=True)
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for path in map(Path, paths):
+        store.register(get_types_from_msg(path.read_text(encoding="utf-8"), f"abreast_msgs/msg/{path.stem}"))
+    ours = [len(store.fielddefs[f"abreast_msgs/msg/{Path(path).stem}"][1]) for path in paths]
+    assert [int(line) for line in done.stdout.split()] == ours
+    assert ours
