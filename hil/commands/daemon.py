@@ -186,9 +186,11 @@ def _emulator(order: Order) -> Worker:
 def _beside_real(order: Order) -> Worker:
     from hil.emulator.beside_real import LAB_FRAMES, BesideReal
     from hil.live.node_worker import NodeWorker
+    from hil.nodes.node import Node
     from hil.nodes.source import SourceNode
 
-    nodes = [SourceNode(order.scenario, LAB_FRAMES), BesideReal(order.scenario, order.needs)]
+    source, robot = SourceNode(order.scenario, LAB_FRAMES), BesideReal(order.scenario, order.needs)
+    nodes: list[Node[Any]] = [source, robot]
     return NodeWorker(nodes, within=(LAB_FRAMES,), on_report=_on_report(), unspoken=(LAB_FRAMES,))
 
 

@@ -213,7 +213,8 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> str:
             console.print(Text(f"robots and bridges connect to {where}"), soft_wrap=True)
         lines = FindingLines(lambda line: console.print(Text(line), soft_wrap=True))
         # Who does not watch a terminal is told as well, once for whatever is waited for.
-        waiting = WaitingLines(lambda line: console.is_terminal or console.print(Text(line), soft_wrap=True))
+        aside = Console(file=sys.stderr, quiet=console.is_terminal)
+        waiting = WaitingLines(lambda line: aside.print(Text(line), soft_wrap=True))
 
         def show(snapshot: Snapshot, elapsed: float | None) -> None:
             for node, findings in list(snapshot.findings.items()):
