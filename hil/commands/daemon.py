@@ -191,7 +191,8 @@ def _beside_real(order: Order) -> Worker:
     from hil.live.node_worker import NodeWorker
     from hil.nodes.source import SourceNode
 
-    nodes: list[Node[Any]] = [SourceNode(order.scenario, LAB_FRAMES), BesideReal(order.scenario, order.needs)]
+    source, robot = SourceNode(order.scenario, LAB_FRAMES), BesideReal(order.scenario, order.needs)
+    nodes: list[Node[Any]] = [source, robot]
     return NodeWorker(nodes, within=(LAB_FRAMES,), on_report=_on_report(), unspoken=(LAB_FRAMES,))
 
 

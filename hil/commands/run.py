@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -89,12 +89,16 @@ def command(
     how = _how(**live)
     given = {"run.duration_s": duration, "run.seed": seed, "estimator.kind": estimator, "controller.law": law}
     options = [f"{key}={value}" for key, value in given.items() if value is not None]
-    options.append(f"source.emulated={how.crew.emulate if how else ''}")
+    if how is None or not how.crew.real:
+        options.append("source.emulated=")
+    elif how.crew.emulate:
+        options.append(f"source.emulated={how.crew.emulate}")
     chosen = load_scenario(scenario, [*overrides, *options, *([CERTIFY] if certify else [])])
     refuse_unrunnable(chosen)
     links_of(chosen)
-    if how is not None and how.crew.emulate:
+    if how is not None and (emulated := chosen.source.emulated):
         refuse_chain(chosen, "--emulate is for a pair: leave it out")
+        how = replace(how, crew=replace(how.crew, emulate=emulated))
     load_own_parts(chosen)
     folder = _folder(chosen, out)
     with claimed(folder):
@@ -209,7 +213,8 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> str:
             console.print(Text(f"robots and bridges connect to {where}"), soft_wrap=True)
         lines = FindingLines(lambda line: console.print(Text(line), soft_wrap=True))
         # Who does not watch a terminal is told as well, once for whatever is waited for.
-        waiting = WaitingLines(lambda line: console.is_terminal or console.print(Text(line), soft_wrap=True))
+        aside = Console(file=sys.stderr, quiet=console.is_terminal)
+        waiting = WaitingLines(lambda line: aside.print(Text(line), soft_wrap=True))
 
         def show(snapshot: Snapshot, elapsed: float | None) -> None:
             for node, findings in list(snapshot.findings.items()):

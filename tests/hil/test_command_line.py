@@ -49,6 +49,12 @@ def test_help_names_every_command() -> None:
         (["recorder", "turtlebot3"], "--out"),
         (["replay", "no_such.mcap"], "no_such.mcap"),
         (["simulate", "turtlebot3", "--law", "clever"], "controller.law"),
+        (["run", "--real", "--lockstep"], "--real"),
+        (["run", "--leader", "hand"], "--real"),
+        (["run", "--emulate", "leader"], "--real"),
+        (["run", "--real", "--emulate", "leader", "--countdown", "1"], "--countdown"),
+        (["run", "--real", "--leader", "hand", "--countdown", "1"], "--countdown"),
+        (["run", "chain5-turtlebot3", "--real", "--emulate", "follower"], "--emulate"),
     ],
 )
 def test_a_mistake_gives_exit_code_2_and_one_line(

@@ -106,10 +106,10 @@ def main() -> None:
         while (left := until - time.time()) > 0.0:
             executor.spin_once(timeout_sec=left)
         now = time.time()
-        if driven_from is None and select.select([sys.stdin], [], [], 0.0)[0]:
+        if select.select([sys.stdin], [], [], 0.0)[0]:
             if not sys.stdin.readline():
                 break
-            driven_from = now
+            driven_from = driven_from or now
         for robot in robots:
             robot.move(now - moved, None if driven_from is None else now - driven_from)
         moved = now
