@@ -180,7 +180,7 @@ def test_leaders_at_the_end_of_the_world_break_nothing(kind: str, front_end: str
 
 
 def wrong_frames() -> list[tuple[str, bytes]]:
-    quaternion = msg.Quaternion(x=0.0, y=0.0, z=0.0, w=0.0)
+    none = msg.Quaternion(x=0.0, y=0.0, z=0.0, w=0.0)
     nan = msg.Point(x=math.nan, y=0.0, z=0.0)
     good = frame_message(WARM_NS, 1, PAIR)
     leader, follower = good.rigidbodies
@@ -190,10 +190,12 @@ def wrong_frames() -> list[tuple[str, bytes]]:
         return encode(msg.RigidBodies(good.header, 1, [body, follower]))
 
     pose = leader.pose
+    unturned = msg.RigidBody("follower", [], msg.Pose(position=follower.pose.position, orientation=none))
     return [
         ("malformed", b"\x0a\x0b\x0c"),
         ("not_finite", with_leader(msg.Pose(position=nan, orientation=pose.orientation))),
-        ("bad_quaternion", with_leader(msg.Pose(position=pose.position, orientation=quaternion))),
+        # A leader may be a single marker; a follower needs its heading.
+        ("bad_quaternion", encode(msg.RigidBodies(good.header, 1, [leader, unturned]))),
         ("unknown_body", encode(frame_message(WARM_NS, 1, [("cat", PAIR[0][1])]))),
         ("missing_follower", encode(frame_message(WARM_NS, 1, PAIR[:1]))),
         ("same_place", encode(frame_message(WARM_NS, 1, [("leader", PAIR[1][1]), PAIR[1]]))),
