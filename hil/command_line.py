@@ -22,6 +22,7 @@ COMMANDS = {
     "import": "turn other recordings into logs",
     "calibrate": "find the offsets of a range and bearing sensor that mocap has watched",
     "recover": "make a cut-off log whole",
+    "doctor": "what is wrong in a lab before anything moves, and what to do about it",
     "status": "daemons, bodies and robots of a lab, live",
     "stop": "stop all robots of a lab",
     "emulator": "the emulated robots and motion capture, as a daemon",

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hil.bridge.seen_frame import SeenBody, SeenFrame
-from hil.bridge.up_axis import Up
+from hil.bridge.seen_frame import SeenBody, SeenFrame, Up, place_of
 from hil.scenario.lab import SourceSection
 from hil.wire import message_types as msg
 from hil.wire.messages import header
 from hil.wire.pose_sources import laid, pose_of, upright
-from hil.wire.records import Placement
 
 FRAME_ID = "mocap"
-_NO_ORIENTATION = (0.0, 0.0, 0.0, 0.0)
 
 
 def known_as(bodies: Sequence[SeenBody], wanted: Sequence[str]) -> list[str]:
@@ -37,12 +34,8 @@ def frame_message(
     up; ``source``: the axes and the unit that whoever hears the message expects.
     """
     bodies = [
-        msg.RigidBody(name, [], pose_of(laid(upright(_place(body), given, 1.0), source.up, source.scale)))
+        msg.RigidBody(name, [], pose_of(laid(upright(place_of(body), given, 1.0), source.up, source.scale)))
         for name, body in zip(names, frame.bodies, strict=True)
         if body.placed
     ]
     return msg.RigidBodies(header(frame.capture_ns, FRAME_ID), frame.number % 2**32, bodies)
-
-
-def _place(body: SeenBody) -> Placement:
-    return Placement(*body.position, *(body.orientation if body.turned else _NO_ORIENTATION))

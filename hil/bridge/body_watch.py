@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import statistics
+from collections import deque
 from collections.abc import Sequence
 
-from hil.bridge.seen_frame import SeenFrame
-from hil.bridge.up_axis import HeightCheck, Up
+from hil.bridge.seen_frame import SeenFrame, Up, place_of
 from hil.nodes.findings import named_findings
+from hil.nodes.frame_findings import axes_text
+from hil.nodes.frame_looks import KEPT_NS, LOOK_NS
+from hil.wire.pose_sources import upright
+from hil.wire.records import Placement
 
 _RECENT_NS = 500_000_000
 _SHOWN = 8
@@ -20,7 +24,8 @@ class BodyWatch:
         self.wanted = tuple(wanted)
         self.untracked = 0
         self.not_finite = 0
-        self._height = HeightCheck(up)
+        self._up = up
+        self._tracks: dict[str, deque[tuple[int, Placement]]] = {}
         self._seen: dict[str, int] = {}
         self._in_frames: dict[str, int] = {}
         self._frame_ns = 0
@@ -39,7 +44,7 @@ class BodyWatch:
             else:
                 self._seen[name] = frame.arrived_ns
                 if name in self.wanted:
-                    self._height.see(name, body.position)
+                    self._track(name, frame.arrived_ns, upright(place_of(body), self._up, 1.0))
 
     def sees_frames(self, now_ns: int) -> bool:
         """Whether a frame has come of late."""
@@ -66,7 +71,9 @@ class BodyWatch:
 
     def findings(self, now_ns: int) -> dict[str, str]:
         """What is wrong, by the names of findings."""
-        found = {"axes": self._height.wrong} if self._height.wrong else {}
+        tracks = {name: [place for _, place in track] for name, track in self._tracks.items()}
+        axes = "; ".join(filter(None, (axes_text(name, track) for name, track in tracks.items())))
+        found = {"axes": f"by {self._up} up, as told, {axes}"} if axes else {}
         there = self._recent(self._in_frames, now_ns)
         missing = [name for name in self.wanted if name not in there]
         if missing and self.sees_frames(now_ns):
@@ -86,6 +93,14 @@ class BodyWatch:
             values["delay_spread_ms"] = f"{(max(self._delays) - min(self._delays)) * 1e-6:.3f}"
             self._delays.clear()
         return values | named_findings(self.findings(now_ns))
+
+    def _track(self, name: str, at_ns: int, place: Placement) -> None:
+        """Keep where a body is, now and then."""
+        track = self._tracks.setdefault(name, deque())
+        if not track or not 0 <= at_ns - track[-1][0] < LOOK_NS:
+            track.append((at_ns, place))
+        while abs(at_ns - track[0][0]) > KEPT_NS:
+            track.popleft()
 
     def _recent(self, when_ns: dict[str, int], now_ns: int) -> list[str]:
         return [name for name, at_ns in when_ns.items() if now_ns - at_ns < _RECENT_NS]

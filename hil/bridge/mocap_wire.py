@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 from hil.bridge.body_frames import frame_message, known_as
 from hil.bridge.body_watch import BodyWatch
-from hil.bridge.seen_frame import SeenFrame
-from hil.bridge.up_axis import Up
+from hil.bridge.seen_frame import SeenFrame, Up
 from hil.errors import UsageError
 from hil.live.finding_lines import FindingLines
 from hil.nodes.node import Outgoing, diagnostics, is_due, outgoing

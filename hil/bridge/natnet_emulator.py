@@ -20,8 +20,10 @@ from hil.live.node_worker import NodeWorker
 from hil.nodes.node import Outgoing
 from hil.wire import topics
 from hil.wire.events import TICK, Event
-from hil.wire.message_types import RigidBodies, RigidBody
+from hil.wire.message_types import RigidBodies
 from hil.wire.messages import decode_as, to_ns
+from hil.wire.pose_sources import laid, places_of
+from hil.wire.records import Placement
 from hil.wire.source_topics import all_bodies
 
 _MARKER_ERROR = 0.0002
@@ -45,6 +47,7 @@ class Serving:
 class NatNetEmulator(NodeWorker):
     """Carries the emulator on, and serves its frames by NatNet; none of them goes to the wire.
 
+    Its axes are those of the scenario's ``source.up``, its unit is the metre.
     A thread answers clients at once: how long an answer takes is what they set their clocks by. ``alone``:
     the leader sets off at once, with nobody to wait for. Raises :class:`~hil.errors.AbreastError` where the
     port is taken.
@@ -60,6 +63,7 @@ class NatNetEmulator(NodeWorker):
     ) -> None:
         super().__init__([node], on_report=on_report)
         scenario = node.scenario
+        self._up = scenario.source.up
         self._alone, self._capture_clock = alone, lab_of(scenario).clock
         self._base_ns = 0
         self._socket = open_socket(serving.address, serving.command_port)
@@ -121,7 +125,8 @@ class NatNetEmulator(NodeWorker):
 
     def _serve(self, payload: bytes) -> None:
         frame = decode_as(payload, RigidBodies)
-        bodies = [_body(k, body) for k, body in enumerate(frame.rigidbodies, start=1)]
+        places = (laid(each.place, self._up, 1.0) for each in places_of(frame))
+        bodies = [_body(k, place) for k, place in enumerate(places, start=1)]
         captured_ns = max(0, to_ns(frame.header.stamp) - self._base_ns)
         with self._lock:
             packets = self._service.frame(frame.frame_number, bodies, captured_ns, time.time_ns())
@@ -155,11 +160,9 @@ def run_alone(
         pass
 
 
-def _body(number: int, body: RigidBody) -> Body:
-    at, turned = body.pose.position, body.pose.orientation
-    return Body(
-        number, (at.x, at.y, at.z), (turned.x, turned.y, turned.z, turned.w), _MARKER_ERROR, tracked=True
-    )
+def _body(number: int, place: Placement) -> Body:
+    x, y, z, qx, qy, qz, qw = place
+    return Body(number, (x, y, z), (qx, qy, qz, qw), _MARKER_ERROR, tracked=True)
 
 
 def _free_port() -> int:

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
+from hil.wire.records import Placement
+
+Up = Literal["y", "z"]
+"""The axis of a motion capture that points up."""
+
+_NO_ORIENTATION = (0.0, 0.0, 0.0, 0.0)
 _KEPT = 256
 _ANEW = 1000
 
@@ -31,6 +37,11 @@ class SeenBody(NamedTuple):
     def turned(self) -> bool:
         """Whether its orientation is made of numbers; that of a single marker is not."""
         return all(map(math.isfinite, self.orientation))
+
+
+def place_of(body: SeenBody) -> Placement:
+    """The pose of a body; one without an orientation gets zeros for it."""
+    return Placement(*body.position, *(body.orientation if body.turned else _NO_ORIENTATION))
 
 
 class SeenFrame(NamedTuple):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
 import click
 
 from formation.collector import collector_paused
-from hil.bridge.up_axis import Up
+from hil.bridge.seen_frame import Up
 from hil.commands.daemon import DEFAULT_ENDPOINT
 from hil.commands.seconds import DURATION
 from hil.scenario.files import load_scenario

@@ -169,6 +169,8 @@ def _emulator(order: Order) -> Worker:
     from hil.wire import topics
     from hil.wire.source_topics import converts
 
+    if order.scenario.source.emulated:
+        return _beside_real(order)
     node = EmulatorNode(order.scenario, order.needs)
     if order.natnet.natnet:
         from hil.bridge.natnet_emulator import NatNetEmulator
@@ -181,6 +183,15 @@ def _emulator(order: Order) -> Worker:
     frames = (topics.RIGID_BODIES,)
     foreign = ForeignMocapNode(order.scenario)
     return NodeWorker([node, foreign], within=frames, on_report=_on_report(), unspoken=frames)
+
+
+def _beside_real(order: Order) -> Worker:
+    from hil.emulator.beside_real import LAB_FRAMES, BesideReal
+    from hil.live.node_worker import NodeWorker
+    from hil.nodes.source import SourceNode
+
+    nodes = [SourceNode(order.scenario, LAB_FRAMES), BesideReal(order.scenario, order.needs)]
+    return NodeWorker(nodes, within=(LAB_FRAMES,), on_report=_on_report(), unspoken=(LAB_FRAMES,))
 
 
 def _serve_alone(order: Order, ending: Ending, duration_s: float | None) -> None:

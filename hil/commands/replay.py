@@ -10,11 +10,13 @@ import click
 from formation.collector import collector_paused
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
-from hil.log.report_json import print_json, results_apart
+from hil.log.report_json import print_json, print_text, results_apart
 from hil.reports.judged_log import leave, made_folder
 
 if TYPE_CHECKING:
+    from hil.judge.replayed import Replayed
     from hil.judge.run_data import RunData
+    from hil.log.reader import Log
     from hil.scenario.schema import Scenario
 
 
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 @click.option("--leader", metavar="NAME", help="Name of the leader's body.")
 @click.option("--follower", metavar="NAME", help="Name of the follower's body.")
 @click.option("--map", "chart", metavar="FILE", help="Names the topics of a log that is not abreast's.")
+@click.option("--propose-map", "propose", is_flag=True, help="Print a map for LOG's topics, and no more.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key.")
 @click.option("--from", "from_s", type=Seconds(), metavar="S", help="Judge from here on.")
 @click.option("--to", "to_s", type=Seconds(), metavar="S", help="Judge up to here.")
@@ -50,6 +53,7 @@ def command(
     leader: str | None,
     follower: str | None,
     chart: str | None,
+    propose: bool,
     overrides: tuple[str, ...],
     from_s: float | None,
     to_s: float | None,
@@ -68,6 +72,11 @@ def command(
 
     # First of all: what replays takes over a second to load, and to compile where that is still to be done.
     given = opened_log(log)
+    if propose:
+        from hil.replay.proposed_map import proposed_map
+
+        print_text(proposed_map(given, leader, follower))
+        return
 
     from hil.judge.replay_verdict import print_fed, violated_bounds
     from hil.judge.replayed import ReplayChoice, chain_in, replayed
@@ -89,7 +98,9 @@ def command(
         from hil.commands.chain_results import leave_replay
 
         _refuse_table(table, chain)
-        leave_replay(given, replayed(given, choice), out, as_json=as_json, verify=verify, strict=strict)
+        done = replayed(given, choice)
+        leave_replay(given, done, out, as_json=as_json, verify=verify, strict=strict)
+        _refuse_damage(given, done)
         return
     done = replayed(given, choice)
     (played,), (run_data,), summary = done.played, done.runs, done.summary
@@ -109,6 +120,13 @@ def command(
     if strict and (broken := violated_bounds(summary)):
         counts = ", ".join(f"{name} by {count}" for name, count in broken.items())
         raise CheckFailedError(f"log {log}: bounds violated (samples): {counts}")
+    _refuse_damage(given, done)
+
+
+def _refuse_damage(log: Log, done: Replayed) -> None:
+    """Fail for what is gone of a log, now that the rest has been told."""
+    if done.damage:
+        raise CheckFailedError(f"log {log.path}: {done.damage}")
 
 
 def _refuse_table(table: Path | None, chain: Scenario) -> None:

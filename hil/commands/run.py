@@ -22,7 +22,7 @@ from hil.log.report_json import print_json, results_apart
 from hil.reports.judged_log import claimed, judge_log, made_folder
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario, refuse_unrunnable
-from hil.scenario.links import chain_of, links_of
+from hil.scenario.links import chain_of, links_of, refuse_chain
 from hil.scenario.schema import Scenario
 
 
@@ -40,6 +40,11 @@ from hil.scenario.schema import Scenario
 )
 @click.option(
     "--real", is_flag=True, help="With robots and motion capture that exist, in the place of emulated ones."
+)
+@click.option(
+    "--emulate",
+    type=click.Choice(("leader", "follower")),
+    help="The one of two real robots that is emulated.",
 )
 @click.option(
     "--leader",
@@ -84,9 +89,12 @@ def command(
     how = _how(**live)
     given = {"run.duration_s": duration, "run.seed": seed, "estimator.kind": estimator, "controller.law": law}
     options = [f"{key}={value}" for key, value in given.items() if value is not None]
+    options.append(f"source.emulated={how.crew.emulate if how else ''}")
     chosen = load_scenario(scenario, [*overrides, *options, *([CERTIFY] if certify else [])])
     refuse_unrunnable(chosen)
     links_of(chosen)
+    if how is not None and how.crew.emulate:
+        refuse_chain(chosen, "--emulate is for a pair: leave it out")
     load_own_parts(chosen)
     folder = _folder(chosen, out)
     with claimed(folder):
@@ -106,6 +114,7 @@ def _how(
     lockstep: bool,
     apart: bool,
     real: bool,
+    emulate: str | None,
     driven_by: str | None,
     countdown: float | None,
     listen: str | None,
@@ -120,16 +129,19 @@ def _how(
         raise UsageError(
             f"{option}: a run in lockstep is one process; leave one of {option} and --lockstep out"
         )
-    if (driven_by is not None or countdown is not None) and not real:
-        option = "--countdown" if driven_by is None else "--leader"
-        raise UsageError(f"{option}: is for a leader that exists; give --real too")
+    leads = "--leader" if driven_by is not None else "--countdown" if countdown is not None else ""
+    if (leads or emulate is not None) and not real:
+        raise UsageError(f"{leads or '--emulate'}: is for a run with real robots; give --real too")
+    if leads and emulate == "leader":
+        raise UsageError(f"{leads}: is for a leader that exists; leave it out, or --emulate leader")
     if driven_by == "hand" and countdown is not None:
         raise UsageError("--countdown: who drives the leader by hand counts himself; leave it out")
     if listen is not None and zenoh_config is not None:
         raise UsageError("--listen: --zenoh-config leads to a router that is there; leave one out")
     if lockstep:
         return None
-    crew = Crew(apart=apart, real=real, by_hand=driven_by == "hand", countdown_s=countdown)
+    by_hand = driven_by == "hand"
+    crew = Crew(apart=apart, real=real, emulate=emulate or "", by_hand=by_hand, countdown_s=countdown)
     return _Live(listen or (DEFAULT_ENDPOINT if real else None), zenoh_config, crew)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from hil.errors import UsageError
@@ -21,7 +21,8 @@ from hil.judge.summary import summarise
 from hil.log.description import RECORD
 from hil.log.metadata import scenario_of
 from hil.log.own_sources import with_sources
-from hil.log.reader import Log
+from hil.log.reader import DamagedLogError, Log
+from hil.log.unpacked import salvaged
 from hil.replay.feeding import guessed_link, why_guessed
 from hil.replay.log_replay import kept_replays
 from hil.replay.rerun import linked, replay_chain, replay_fed, replay_foreign, replay_link
@@ -63,13 +64,14 @@ class ReplayChoice:
 class Replayed:
     """A replay of one follower, or of each of a chain: its JSON, what it was judged by, and how it went.
 
-    ``scenario``: the one that it was replayed by, of a chain as a whole.
+    ``scenario``: the one that it was replayed by, of a chain as a whole. ``damage``: what is gone of the log.
     """
 
     summary: dict[str, Any]
     runs: tuple[RunData, ...]
     played: tuple[Played, ...]
     scenario: Scenario
+    damage: str = ""
 
     def why_not_same(self, log: Log) -> str:
         """What speaks against a replay that repeats the log bit for bit; empty if nothing does."""
@@ -83,24 +85,42 @@ def chain_in(log: Log, choice: ReplayChoice) -> Scenario | None:
 
 
 def replayed(log: Log, choice: ReplayChoice) -> Replayed:
-    """Replay a log and judge what comes out.
+    """Replay a log and judge what comes out, of a damaged log what is whole.
 
     Raises :class:`UsageError` for what cannot be replayed so, and for settings that cannot be verified.
     """
+    try:
+        return _replayed(log, choice)
+    except DamagedLogError:
+        if log.damage or log.source is not None:
+            raise
+    return _replayed(salvaged(log.path), choice)
+
+
+def _replayed(log: Log, choice: ReplayChoice) -> Replayed:
     if choice.from_s is not None and choice.to_s is not None and choice.to_s <= choice.from_s:
         raise UsageError(f"--to {choice.to_s:g}: expected more than --from {choice.from_s:g}")
     log, changes = _with_sources(log, choice)
     if (chain := chain_in(log, choice)) is not None:
         return _replayed_chain(log, chain, choice, changes)
     played = _played(log, choice, changes)
-    run_data = run_data_of_replay(log, played, choice.from_s, choice.to_s)
+    run_data = _with_damage(log, run_data_of_replay(log, played, choice.from_s, choice.to_s))
     summary = summarise(run_data)
     if choice.chart is None and (own_motion := judge_own_motion(log, played)):
         summary["own_motion"] = own_motion
     if choice.verify:
         summary["parity"] = parity_json(played)
     summary |= fed_json(played)
-    return Replayed(summary, (run_data,), (played,), played.scenario)
+    return Replayed(summary, (run_data,), (played,), played.scenario, log.damage)
+
+
+def _with_damage(log: Log, run_data: RunData) -> RunData:
+    """Run data that names what is gone of the log among what was found."""
+    if not log.damage:
+        return run_data
+    others = run_data.found or {}
+    of_log = {**others.get("log", {}), "log_damaged": log.damage}
+    return replace(run_data, found={**others, "log": of_log})
 
 
 def _with_sources(log: Log, choice: ReplayChoice) -> tuple[Log, tuple[Overrides, ...]]:
@@ -125,7 +145,9 @@ def _replayed_chain(log: Log, own: Scenario, choice: ReplayChoice, changes: Sequ
         refuse_other_steps(chosen, own)
     kept = None if choice.in_messages else kept_replays(log, linked(log, chosen))
     played: tuple[Played, ...] = replay_chain(log, chosen) if kept is None else kept
-    runs = tuple(run_data_of_replay(log, each, choice.from_s, choice.to_s) for each in played)
+    runs = tuple(
+        _with_damage(log, run_data_of_replay(log, each, choice.from_s, choice.to_s)) for each in played
+    )
     summary = summarise_chain(chosen, runs)
     for pair, each in zip(summary["pairs"], played, strict=True):
         pair |= fed_json(each)
@@ -133,7 +155,7 @@ def _replayed_chain(log: Log, own: Scenario, choice: ReplayChoice, changes: Sequ
         summary["parity"] = parity_json(*played)
         for pair, each in zip(summary["pairs"], played, strict=True):
             pair["parity"] = parity_json(each)
-    return Replayed(summary, runs, played, chosen)
+    return Replayed(summary, runs, played, chosen, log.damage)
 
 
 def _played(log: Log, choice: ReplayChoice, changes: Sequence[Overrides]) -> Played:

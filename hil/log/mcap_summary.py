@@ -29,12 +29,25 @@ _CHANNEL_OFFSET = np.dtype([("channel", "<u2"), ("offset", "<u8")])
 
 
 class ChunkPlace(NamedTuple):
-    """Where a chunk is, and the log times of its first and last message; ``offsets``: a map by channel."""
+    """Where a chunk is, and the log times of its first and last message; ``offsets``: a map by channel.
+
+    ``length``: of its record in bytes, head included.
+    """
 
     first_ns: int
     last_ns: int
     offset: int
     offsets: bytes
+    length: int
+
+    def is_there(self, stream: BinaryIO) -> bool:
+        """Whether a file has the head of such a chunk at its place."""
+        stream.seek(self.offset)
+        head = stream.read(_RECORD.size)
+        return len(head) == _RECORD.size and _RECORD.unpack(head) == (
+            Opcode.CHUNK,
+            self.length - _RECORD.size,
+        )
 
     def may_hold(self, channels: Collection[int]) -> bool:
         """Whether a message of one of the channels may be in it. Without a map there may be any."""
@@ -84,9 +97,10 @@ def _summary_of(data: bytes) -> McapSummary:
         if at + length > len(data):
             raise ValueError("a record is longer than the summary that it is in")
         if opcode == Opcode.CHUNK_INDEX:
-            first_ns, last_ns, offset, _, size = _CHUNK.unpack_from(data, at)
+            first_ns, last_ns, offset, whole, size = _CHUNK.unpack_from(data, at)
             begin = at + _CHUNK.size
-            summary.chunks.append(ChunkPlace(first_ns, last_ns, offset, data[begin : begin + size]))
+            offsets = data[begin : begin + size]
+            summary.chunks.append(ChunkPlace(first_ns, last_ns, offset, offsets, whole))
         else:
             _add(summary, opcode, ReadDataStream(io.BytesIO(data[at : at + length])))
         at += length

@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import heapq
-import shutil
-import tempfile
-import weakref
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import BinaryIO
 
-import zstandard
+from hil.log.reader import Log, Record, told_in_messages
+from hil.log.unpacked import in_place_of, unpacked, whole_or_salvaged
 
-from hil.errors import UsageError
-from hil.log.reader import Log, Record, damaged, read_log, told_in_messages
-
-_PIECE_BYTES = 1 << 20
 _ZSTD = (".zstd", ".zst")
 
 
@@ -25,7 +18,7 @@ def opened_log(path: Path) -> Log:
     """The log at a path: ``.mcap``, ``.db3``, either of them with ``.zstd``, ROS 1's ``.bag``, or a folder.
 
     A folder is what ``ros2 bag record`` leaves: its files, in which ``metadata.yaml`` need not be, are one
-    log. Raises :class:`UsageError` as :func:`hil.log.reader.read_log`.
+    log. Of a damaged MCAP what is whole. Raises :class:`UsageError` as :func:`hil.log.reader.read_log`.
     """
     if not path.is_dir():
         return _opened(path, compressed=False)
@@ -40,11 +33,8 @@ def opened_log(path: Path) -> Log:
 def _opened(path: Path, *, compressed: bool) -> Log:
     """The log in one file."""
     if path.suffix in _ZSTD:
-        unpacked = _Unpacked(path)
-        inner = _opened(unpacked.file, compressed=compressed)
-        return replace(
-            inner, path=path, channels={}, chunks=(), source=partial(_unpacked_records, unpacked, inner)
-        )
+        copy = unpacked(path)
+        return in_place_of(path, _opened(copy.file, compressed=compressed), copy)
     if path.suffix == ".bag":
         from hil.log.ros_storage import read_bag
 
@@ -54,7 +44,7 @@ def _opened(path: Path, *, compressed: bool) -> Log:
 
         log = read_db3(path, compressed=compressed)
         return replace(log, metadata=told_in_messages(log))
-    return read_log(path)
+    return whole_or_salvaged(path)
 
 
 def _joined(path: Path, parts: Sequence[Log]) -> Log:
@@ -76,6 +66,7 @@ def _joined(path: Path, parts: Sequence[Log]) -> Log:
         chunks=(),
         counts=counts,
         source=partial(_merged, parts),
+        damage="; ".join(f"{part.path.name}: {part.damage}" for part in parts if part.damage),
     )
 
 
@@ -89,46 +80,3 @@ def _merged(
         return part.records(topics, start_ns, end_ns)
 
     yield from heapq.merge(*map(of, parts), key=lambda record: record.log_ns)
-
-
-class _Unpacked:
-    """A compressed file, unpacked into a temporary one for as long as this lives."""
-
-    def __init__(self, path: Path) -> None:
-        folder = tempfile.mkdtemp(prefix="abreast-")
-        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
-        self.file = Path(folder) / path.stem
-        try:
-            with path.open("rb") as packed, self.file.open("wb") as target:
-                if not _unpack(packed, target):
-                    raise damaged(path, "it is cut off")
-        except zstandard.ZstdError as error:
-            raise damaged(path, str(error)) from None
-        except FileNotFoundError:
-            raise UsageError(f"log {path}: no such file; check the path") from None
-        except OSError as error:
-            reason = error.strerror or str(error)
-            raise UsageError(f"log {path}: cannot be unpacked into {folder} ({reason})") from None
-
-
-def _unpack(packed: BinaryIO, target: BinaryIO) -> bool:
-    """Unpack a file of frames; whether the last of them is whole."""
-    frame = zstandard.ZstdDecompressor().decompressobj()
-    while piece := packed.read(_PIECE_BYTES):
-        while piece:
-            if frame.eof:
-                frame = zstandard.ZstdDecompressor().decompressobj()
-            target.write(frame.decompress(piece))
-            piece = frame.unused_data
-    return frame.eof
-
-
-def _unpacked_records(
-    _held: _Unpacked,
-    inner: Log,
-    topics: Collection[str] | None,
-    start_ns: int | None,
-    end_ns: int | None,
-) -> Iterator[Record]:
-    """Messages of an unpacked file, which is there for as long as it is held."""
-    yield from inner.records(topics, start_ns, end_ns)

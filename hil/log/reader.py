@@ -69,7 +69,8 @@ class Log:
     there are, from ``start_ns`` to ``end_ns`` in log time (both None in a log without messages). ``counts``:
     how many by topic, where the log tells. ``channels``: topic and type name by channel id. ``chunks``: in
     the order of their first messages, none in a log without an index. ``source``: gives the messages of a log
-    that isn't one MCAP, by topics and log times as :meth:`records` is asked for them.
+    that isn't one MCAP, by topics and log times as :meth:`records` is asked for them. ``damage``: what is
+    gone of a damaged log, in one line.
 
     >>> import abreast
     >>> scenario = abreast.load_scenario("turtlebot3", {"run.duration_s": 2.0})
@@ -92,6 +93,7 @@ class Log:
     chunks: Sequence[ChunkPlace] = field(repr=False)
     counts: Mapping[str, int] = field(default_factory=dict)
     source: Source | None = field(default=None, repr=False)
+    damage: str = ""
 
     def records(
         self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
@@ -190,6 +192,8 @@ def read_log(path: Path) -> Log:
             schemas, channels, messages, start_ns, end_ns = _scan(stream)
             counts = {}
         if summary is not None:
+            if not all(chunk.is_there(stream) for chunk in summary.chunks):
+                raise damaged(path, "chunks are not where its summary has them")
             records = [read_metadata(stream, index) for index in summary.metadata]
         else:
             stream.seek(0)
@@ -268,9 +272,13 @@ def reading(path: Path) -> Iterator[BinaryIO]:
         raise damaged(path, " ".join(str(error).split()) or type(error).__name__) from None
 
 
-def damaged(path: Path, reason: str) -> UsageError:
+class DamagedLogError(UsageError):
+    """A log whose bytes are not as they were written. What is whole of it can be read all the same."""
+
+
+def damaged(path: Path, reason: str) -> DamagedLogError:
     """The error for a log whose bytes are not as they were written."""
-    return UsageError(f"log {path}: is damaged ({reason}); save what is whole with: abreast recover")
+    return DamagedLogError(f"log {path}: is damaged ({reason}); save what is whole with: abreast recover")
 
 
 def _refuse_cut_off(stream: BinaryIO, path: Path) -> None:

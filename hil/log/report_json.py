@@ -63,6 +63,11 @@ def print_with_nulls(result: Mapping[str, Any]) -> None:
     click.echo(json.dumps(result, allow_nan=False), file=_results.get())
 
 
+def print_text(text: str) -> None:
+    """Print a result that is text on stdout."""
+    click.echo(text, file=_results.get(), nl=False)
+
+
 def write_json(result: Mapping[str, Any], path: Path) -> None:
     """Write a result to a file, indented."""
     path.write_text(as_json(result, indent=2) + "\n", encoding="utf-8")

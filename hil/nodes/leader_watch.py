@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from hil.nodes.capture_time import captured_ns
 from hil.nodes.leader_driver import NAME
 from hil.nodes.node import Counts, Outgoing, counted, diagnostics, is_due, named_counts, no_counts, outgoing
 from hil.nodes.start_barrier import NOBODY, Attendance, StartBarrier
@@ -23,7 +24,6 @@ FRAMES_OFF = 3
 """So many frames in a row must say so: one may show another body."""
 
 _DIAGNOSTICS_NS = 500_000_000
-_LIKELY_NS = 1_000_000_000
 
 
 class Rest(NamedTuple):
@@ -65,9 +65,8 @@ class LeaderWatch:
     def __init__(self, scenario: Scenario, needs: frozenset[str]) -> None:
         self.barrier = StartBarrier(needs, links_of(scenario))
         self._body = bodies_of(scenario)[0]
-        given = scenario.estimator
-        self._reach = max(SET_OFF_M, 6.0 * given.sigma_position)
-        self._later_ns = round(given.stamp_offset_s * 1e9)
+        self._reach = max(SET_OFF_M, 6.0 * scenario.estimator.sigma_position)
+        self._estimator = scenario.estimator
         self.subscribes = (*self.barrier.subscribes, topics.RIGID_BODIES)
 
     def begin(self, now_ns: int) -> WatchState:
@@ -119,14 +118,9 @@ class LeaderWatch:
         x, y = body.pose.position.x, body.pose.position.y
         if not (math.isfinite(x) and math.isfinite(y)):
             return ()
-        at_ns = self._captured_ns(to_ns(frame.header.stamp), now_ns)
+        at_ns = captured_ns(self._estimator, to_ns(frame.header.stamp), now_ns)
         state.rest = Rest(x, y) if state.rest is None else seen_at(state.rest, x, y, at_ns, self._reach)
         if state.rest.frames_off < FRAMES_OFF:
             return ()
         state.since_ns = state.rest.off_since_ns
         return (self.report(state, now_ns),)
-
-    def _captured_ns(self, stamp_ns: int, now_ns: int) -> int:
-        """When a frame was captured, by its stamp if that can be of the host's clock."""
-        captured_ns = stamp_ns - self._later_ns
-        return captured_ns if abs(captured_ns - now_ns) < _LIKELY_NS else now_ns

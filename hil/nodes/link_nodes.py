@@ -35,9 +35,11 @@ def controller_node(link: Link) -> ControllerNode:
 def source_nodes(links: Sequence[Link], scenario: Scenario) -> list[SourceNode]:
     """What makes frames of a lab's own messages, where these links have the first and frames are to be made.
 
-    One process does it for all, so that all followers of a chain are given the same frames.
+    One process does it for all, so that all followers of a chain are given the same frames. Where one robot
+    is emulated the emulator does.
     """
-    return [SourceNode(scenario)] if converts(scenario) and any(link.first for link in links) else []
+    makes = converts(scenario) and not scenario.source.emulated
+    return [SourceNode(scenario)] if makes and any(link.first for link in links) else []
 
 
 def frames_within(source: Sequence[SourceNode]) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from hil.wire import topics
 from hil.wire.events import Event
 from hil.wire.messages import MalformedPayloadError, header
 from hil.wire.pose_sources import NamedPlace, places_in, pose_of, upright
-from hil.wire.source_topics import all_bodies, source_topics
+from hil.wire.source_topics import lab_bodies, source_topics
 
 NAME = "source"
 _TICK_NS = 100_000_000
@@ -62,10 +62,10 @@ class SourceNode:
 
     name = NAME
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._given = scenario.source
+    def __init__(self, scenario: Scenario, frames: str = topics.RIGID_BODIES) -> None:
+        self._given, self._frames = scenario.source, frames
         self._within_ns = round(scenario.source.pair_within_s * 1e9)
-        self._bodies = frozenset(all_bodies(scenario))
+        self._bodies = frozenset(lab_bodies(scenario))
         self._topics = source_topics(scenario)
         self.subscribes = tuple(self._topics)
 
@@ -163,7 +163,7 @@ class SourceNode:
         ]
         head = header(gathered.at_ns, gathered.places[0].frame_id)
         frame = msg.RigidBodies(head, state.number % 2**32, bodies)
-        yield outgoing(topics.RIGID_BODIES, frame, gathered.at_ns)
+        yield outgoing(self._frames, frame, gathered.at_ns)
 
 
 def _differing(frame_ids: dict[str, str]) -> str:

@@ -208,6 +208,9 @@ def _check_measurement(chart: ColumnMap, source: str) -> None:
     if chart.up == "y":
         poses |= {"leader_z", "follower_z"}
     poses |= turned if turned & set(chart.columns) or chart.up == "y" else {"follower_theta"}
+    quaternion = {f"leader_q{axis}" for axis in "xyzw"}
+    if 0 < len(quaternion & set(chart.columns)) < len(quaternion):
+        poses |= quaternion
     has_sighting, has_poses = sighting & set(chart.columns), poses & set(chart.columns)
     if has_sighting and has_poses:
         raise UsageError(

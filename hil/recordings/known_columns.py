@@ -56,9 +56,13 @@ def known_columns(names: Sequence[str], units: Mapping[str, str]) -> KnownColumn
         else:
             found[quantity] = Source(column=name, unit=unit)
     truth = {name: found.pop(name) for name in _NOT_MEASURED if name in found and name not in twice}
+    for role in ("leader", "follower"):
+        turned = [f"{role}_q{axis}" for axis in "xyzw"]
+        if not all(name in found for name in turned):
+            found = {name: source for name, source in found.items() if name not in turned}
     poses = {name: source for name, source in found.items() if name.startswith(("leader_", "follower_"))}
     heading = {"follower_theta"} if "follower_theta" in poses else {f"follower_q{axis}" for axis in "xyzw"}
-    if {"leader_x", "leader_y", "follower_x", "follower_y"} | heading <= poses.keys():
+    if {"t", "leader_x", "leader_y", "follower_x", "follower_y"} | heading <= found.keys():
         columns = {name: found[name] for name in found if name not in ("rho", "alpha2")}
     elif {"t", "rho", "alpha2", "v2", "u2"} <= found.keys():
         columns = {name: found[name] for name in found if name not in poses}

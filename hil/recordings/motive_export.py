@@ -60,12 +60,18 @@ def read_motive(path: Path, text: Text) -> Export:
             f"{source}: expected lines of types, names and axes above {text.lines[axes_at][:20]!r}"
         )
     axes = split_line(text.lines[axes_at], layout.delimiter)
+    order = _rotation_order(source, about.get("rotation type", "Quaternion"))
     columns = _columns(heading[0], heading[1], heading[-1], axes)
+    turned = set("XYZW") if order is None else set("XYZ")
+    columns = {
+        name: body
+        for name, body in columns.items()
+        if body.position.keys() == set("XYZ") and body.rotation.keys() == turned
+    }
     if not columns:
         raise UsageError(
             f"{source}: has no rigid bodies; export with the option for rigid bodies switched on"
         )
-    order = _rotation_order(source, about.get("rotation type", "Quaternion"))
     unit = about.get("length units", "Meters")
     scale = factor_of("leader_x", unit)
     if scale is None:
@@ -97,7 +103,7 @@ def _axes_line(source: str, text: Text, layout: Layout) -> int:
 def _columns(
     types: Sequence[str], names: Sequence[str], kinds: Sequence[str], axes: Sequence[str]
 ) -> dict[str, _Columns]:
-    """Columns of the bodies by name, of those that have both a rotation and a position."""
+    """Columns of the bodies by name, as far as they are there."""
     found: dict[str, _Columns] = {}
     for k, (kind, name, what, axis) in enumerate(zip(types, names, kinds, axes, strict=False)):
         if kind.lower() != _BODY or axis.upper() not in ("X", "Y", "Z", "W"):
@@ -107,7 +113,7 @@ def _columns(
             body.rotation[axis.upper()] = k
         elif what.lower() == "position":
             body.position[axis.upper()] = k
-    return {name: body for name, body in found.items() if len(body.position) == 3 and len(body.rotation) >= 3}
+    return found
 
 
 def _rotation_order(source: str, rotation: str) -> str | None:

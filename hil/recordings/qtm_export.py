@@ -29,6 +29,7 @@ _MATRIX = tuple(f"Rot[{k}]" for k in range(9))
 _ANGLES = ("Roll", "Pitch", "Yaw")
 _TABS = Layout("\t", ".")
 _HEADING_LINES = 60
+_NO_ROTATION = 0.1
 _KEY = re.compile(r"[A-Z][A-Z0-9_]{3,}")
 
 
@@ -95,9 +96,12 @@ def _bodies(source: str, names: Sequence[str], titles: Sequence[str]) -> list[_B
     bodies: list[_Body] = []
     for name, start, end in zip(names, starts, [*starts[1:], len(titles)], strict=True):
         places = {"X": start} | {titles[k]: k for k in range(start + 1, end) if titles[k]}
-        if not (set(_MATRIX) <= places.keys() or set(_ANGLES) <= places.keys()):
-            raise UsageError(f"{source}: body {name!r} has neither Rot[0] to Rot[8] nor Roll, Pitch, Yaw")
         some = _MATRIX if set(_MATRIX) <= places.keys() else _ANGLES
+        if not {"Y", "Z", *some} <= places.keys():
+            raise UsageError(
+                f"{source}: body {name!r} lacks columns; expected X, Y, Z, and Rot[0] to Rot[8] or Roll, "
+                "Pitch, Yaw"
+            )
         bodies.append(_Body(name, {title: places[title] for title in ("X", "Y", "Z", *some)}))
     return bodies
 
@@ -127,9 +131,10 @@ def _placements(cells: ExportCells, body: _Body) -> FloatArray:
 
 
 def _matrix_quaternions(matrix: FloatArray) -> FloatArray:
+    """Quaternions (n, 4) of matrices (n, 9) told by columns; NaN for what is no rotation, as all zeros."""
     quaternions = np.full((len(matrix), 4), np.nan)
-    there = np.isfinite(matrix).all(axis=1) & (np.abs(matrix).max(axis=1) > 0.0)
+    turned = np.nan_to_num(matrix, posinf=0.0, neginf=0.0).reshape(-1, 3, 3).transpose(0, 2, 1)
+    there = np.abs(np.linalg.det(turned) - 1.0) < _NO_ROTATION
     if there.any():
-        turned = matrix[there].reshape(-1, 3, 3).transpose(0, 2, 1)
-        quaternions[there] = Rotation.from_matrix(turned).as_quat()
+        quaternions[there] = Rotation.from_matrix(turned[there]).as_quat()
     return quaternions

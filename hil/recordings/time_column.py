@@ -23,6 +23,7 @@ _DATE = re.compile(
     re.IGNORECASE,
 )
 _NS = 1_000_000_000
+_MOST_DIGITS = 19
 _FINER = (
     ("nanoseconds", 10**17, Decimal("1e-9")),
     ("microseconds", 10**14, Decimal("1e-6")),
@@ -98,7 +99,7 @@ def _seconds(text: str) -> Decimal | None:
     except InvalidOperation:
         return None
     # Python takes underscores; and none of these are times.
-    if "_" in text or not number.is_finite() or abs(number) > LAST_NS:
+    if "_" in text or not number.is_finite() or number.adjusted() > _MOST_DIGITS:
         return None
     return number
 

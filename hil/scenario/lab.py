@@ -27,7 +27,8 @@ class SourceSection(Section, frozen=True, kw_only=True):
     messages for one body each with ``{body}`` in the place of its name. Empty for the usual one of the type.
     ``stamp``: header, or receive where the stamps of the source cannot be used; stamps of 0 are never used.
     ``up``: the axis that points up, ``y`` as Motive streams by default. ``scale``: what its unit of length is
-    in metres. ``pair_within_s``: how far apart two poses may be to be one frame.
+    in metres. ``pair_within_s``: how far apart two poses may be to be one frame. ``emulated``: the robot that
+    does not exist, and whose pose the emulator adds to the lab's frames; empty for none.
     """
 
     type: SourceType = "RigidBodies"
@@ -36,6 +37,7 @@ class SourceSection(Section, frozen=True, kw_only=True):
     up: Literal["z", "y"] = "z"
     scale: Positive = 1.0
     pair_within_s: NonNegative = 0.002
+    emulated: Literal["", "leader", "follower"] = ""
 
 
 class WireSection(Section, frozen=True, kw_only=True):

@@ -46,9 +46,18 @@ def all_bodies(scenario: Scenario) -> tuple[str, ...]:
     return (links[0].bodies[0], *(link.bodies[1] for link in links))
 
 
+def lab_bodies(scenario: Scenario) -> tuple[str, ...]:
+    """Those of them that the lab's motion capture can show: all but that of a robot that is emulated."""
+    bodies, emulated = all_bodies(scenario), scenario.source.emulated
+    left_out = {"leader": bodies[:1], "follower": bodies[1:2]}.get(emulated, ())
+    return tuple(body for body in bodies if body not in left_out)
+
+
 def converts(scenario: Scenario) -> bool:
-    """Whether motion capture comes in another form than ours."""
+    """Whether motion capture comes in another form than ours, or without a robot that is emulated."""
     given = scenario.source
+    if given.emulated:
+        return True
     return given.type != "RigidBodies" or given.stamp != "header" or given.up != "z" or given.scale != 1.0
 
 
@@ -74,7 +83,7 @@ def source_topics(scenario: Scenario) -> dict[str, SourceTopic]:
             f"scenario {scenario.name}: source.topic {given.topic!r} has {BODY}, and a {given.type} holds "
             "all bodies; expected one topic's name"
         )
-    topics = {body: name.replace(BODY, body) for body in all_bodies(scenario)}
+    topics = {body: name.replace(BODY, body) for body in lab_bodies(scenario)}
     return {f"source/{topic}": SourceTopic(topic, typename, body) for body, topic in topics.items()}
 
 

@@ -1,22 +1,23 @@
 """A lab that knows nothing of abreast's emulator: two robots and a motion capture, as a process on the wire.
 
-``python -m tests.hil.live.stranger_lab ENDPOINT POSES.csv [HAND_AFTER_S]``: robots that take whole hundredths
-of what ``cmd_vel`` tells them, tell odometry 20 times a second and keep their last command for ever; the
-motion capture at 120 Hz. The leader is told what to drive, too, or drives by itself, as if by hand, that long
-after the follower was told something for the first time. Ends by SIGTERM, and leaves the robots' own poses.
+``python -m tests.hil.live.stranger_lab ENDPOINT POSES.csv [--hand S] [--without ROBOT]``: robots that take
+whole hundredths of what ``cmd_vel`` tells them, tell odometry 20 times a second and keep their last command
+for ever; the motion capture at 120 Hz. The leader is told what to drive, too, or drives by itself, as if by
+hand, that long after the follower was told something for the first time. A robot that the lab is without is
+neither seen nor heard. Ends by SIGTERM, and leaves the robots' own poses.
 """
 
 from __future__ import annotations
 
+import argparse
 import csv
 import math
 import random
 import signal
-import sys
 import time
 from pathlib import Path
 
-from formation.pose import Pose, advance
+from formation.pose import Motion, Pose, advance
 from hil.emulator.lab_messages import frame_message, odometry_message
 from hil.scenario.files import load_scenario
 from hil.scenario.parts import leader_program
@@ -48,7 +49,7 @@ class Wheels:
         self.pose = advance(self.pose, self.v, self.u, dt)
 
 
-def live(endpoint: str, table: Path, hand_after: float | None) -> None:
+def live(endpoint: str, table: Path, hand_after: float | None, without: str = "") -> None:
     """Be the lab until SIGTERM."""
     scenario = load_scenario("turtlebot3")
     program, dice, asked = leader_program(scenario), random.Random(1), []
@@ -87,13 +88,14 @@ def live(endpoint: str, table: Path, hand_after: float | None) -> None:
             for p in poses
         ]
         stamp_ns = round(now * 1e9)
-        frame = frame_message(stamp_ns, number, zip(robots, seen, strict=True))
+        there = [(name, pose) for name, pose in zip(robots, seen, strict=True) if name != without]
+        frame = frame_message(stamp_ns, number, there)
         wire.publish(topics.RIGID_BODIES, encode(frame))
         number += 1
         if now >= begun + samples * ODOMETRY_S:
             samples += 1
-            for name, robot in robots.items():
-                told = odometry_message(stamp_ns, name, robot.pose, type(program(0.0))(robot.v, robot.u))
+            for name, robot in ((name, robots[name]) for name, _ in there):
+                told = odometry_message(stamp_ns, name, robot.pose, Motion(robot.v, robot.u))
                 wire.publish(f"{name}/odom", encode(told))
     with table.open("w", newline="") as file:
         csv.writer(file).writerows(rows)
@@ -102,4 +104,10 @@ def live(endpoint: str, table: Path, hand_after: float | None) -> None:
 
 
 if __name__ == "__main__":
-    live(sys.argv[1], Path(sys.argv[2]), float(sys.argv[3]) if len(sys.argv) > 3 else None)
+    parser = argparse.ArgumentParser()
+    parser.add_argument("endpoint")
+    parser.add_argument("table", type=Path)
+    parser.add_argument("--hand", type=float)
+    parser.add_argument("--without", default="")
+    given = parser.parse_args()
+    live(given.endpoint, given.table, given.hand, given.without)

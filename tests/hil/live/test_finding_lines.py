@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from hil.live.finding_lines import FindingLines, ProblemLines
+from hil.live.finding_lines import FindingLines, ProblemLines, WaitingLines
 from hil.nodes.findings import advice_on, named_findings
 from hil.nodes.node import diagnostics
 from hil.wire.messages import encode
@@ -65,3 +65,11 @@ def test_figures_with_a_unit_are_not_said_anew() -> None:
         lines.hear(told("estimator", f"heading is +{seconds}.1 deg (sd 0.{seconds}) off"))
     lines.hear(b"?")
     assert said == ["leader: sets off in 1 s", "estimator: heading is +1.1 deg (sd 0.1) off"]
+
+
+def test_what_a_start_waits_for_is_said_once_however_many_seconds_are_left() -> None:
+    said: list[str] = []
+    lines = WaitingLines(said.append)
+    for waits in ("waiting for a command", "waiting for a command", "sets off in 2.5 s", "sets off in 2.0 s"):
+        lines.hear(waits)
+    assert said == ["waiting for a command", "sets off in 2.5 s"]

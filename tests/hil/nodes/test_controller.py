@@ -14,6 +14,7 @@ from estimation.tracking.tracker import Status
 from formation.pose import Motion
 from hil.lockstep.lockstep import EPOCH_NS
 from hil.nodes.controller import ControllerNode, ControllerState
+from hil.nodes.findings import findings_in
 from hil.nodes.node import Outgoing
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
@@ -338,3 +339,18 @@ def test_an_estimate_may_be_50_ms_ahead_of_the_clock_before_it_is_refused() -> N
     for ahead_ms, refused in ((50.0, {}), (50.001, {"bad_stamp": 1})):
         state, _, _ = fed([(NOW_NS, estimate(age_ms=-ahead_ms))])
         assert dict(state.refused) == refused
+
+
+@pytest.mark.parametrize(("v2", "u2", "stands"), [(0.0, 0.0, True), (0.1, 0.3, False), (0.0, 0.3, False)])
+def test_a_robot_that_does_not_answer_is_named_within_two_seconds(v2: float, u2: float, stands: bool) -> None:
+    state = NODE.begin(NOW_NS)
+    found: dict[int, set[str]] = {}
+    for number in range(101):
+        now_ns = NOW_NS + number * 20 * MS
+        state, out = NODE.step(state, estimate(now_ns, v2=v2, u2=u2), now_ns)
+        for message in out:
+            if message.topic == topics.DIAGNOSTICS:
+                report = decode_as(message.payload, msg.DiagnosticArray)
+                found[now_ns - NOW_NS] = set(findings_in(report)[NODE.name])
+    assert found[max(found)] == ({"deaf_robot"} if stands else set())
+    assert not found[min(found)]

@@ -54,6 +54,20 @@ def test_poses_alone_tell_the_followers_motion(tmp_path: Path) -> None:
     assert chart.scenario.estimator.own_motion == "auto"
 
 
+def test_a_map_may_leave_columns_to_their_names(tmp_path: Path) -> None:
+    chart = load_column_map(written(tmp_path, "[scenario.leader]\nk_v = 0.7\n"), ["leader.k_u=2.0"])
+    assert chart.columns == {}
+    assert (chart.scenario.leader.k_v, chart.scenario.leader.k_u) == (0.7, 2.0)
+
+
+def test_a_unit_stands_for_its_scale_and_a_scale_for_itself() -> None:
+    assert Source(column="x", unit="mm").factor("leader_x") == 0.001
+    assert Source(column="x").factor("leader_x", "cm") == 0.01
+    assert Source(column="x", unit="mm").factor("leader_x", "cm") == 0.001
+    assert Source(column="x", scale=2.0).factor("leader_x", "cm") == 2.0
+    assert Source(column="x").factor("leader_x") == 1.0
+
+
 def test_every_shipped_map_is_one_and_is_found_by_its_name() -> None:
     names = shipped_names("maps")
     assert "turtlebot3_lidar_optitrack" in names
@@ -91,6 +105,20 @@ def test_every_shipped_map_is_one_and_is_found_by_its_name() -> None:
         (BODY.replace("v2 = { constant = 0.1 }\n", "") + SCENARIO, r"columns: v2 missing; name a column"),
         (BODY[: BODY.index("v2")] + SCENARIO, r"columns: u2, v2 missing; name columns"),
         (POSES + '[scenario.estimator]\nown_motion = "fused"\n', r"columns: u2, v2 missing; name columns"),
+        (POSES + 'leader_qx = "qx"\n', r"columns: leader_qw, leader_qy, leader_qz missing"),
+        (
+            POSES.replace("follower_theta", "follower_qx"),
+            r"columns: follower_qw, follower_qy, follower_qz missing",
+        ),
+        ('up = "y"\n' + POSES, r"columns: follower_qw, follower_qx, .*follower_z, leader_z missing"),
+        (
+            POSES.replace('"lx"', '{ column = "lx", unit = "deg" }'),
+            r"columns\.leader_x: unit is 'deg', expected one of m, mm, cm",
+        ),
+        (
+            POSES.replace('"lx"', '{ column = "lx", unit = "mm", scale = 2.0 }'),
+            r"columns\.leader_x: give either a unit or a scale",
+        ),
         ("[topics]", r"map lab: maps the topics of a log; take it to: abreast replay"),
         (BODY, r"range and bearing need the body front end; set scenario\.estimator\.front_end = 'body'"),
         ('inputs = "guessed"\n' + BODY + SCENARIO, r"inputs is 'guessed'"),

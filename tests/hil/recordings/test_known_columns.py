@@ -31,7 +31,8 @@ POSES = ["leader_x", "leader_y", "follower_x", "follower_y", "follower_theta"]
     ],
 )
 def test_a_column_is_known_by_its_name(name: str, quantity: str, unit: str | None) -> None:
-    others = [other for other in ["t", *POSES, "v2", "u2"] if other != quantity]
+    turned = [f"follower_q{axis}" for axis in "xyzw"]
+    others = [other for other in ["t", *POSES, *turned, "v2", "u2"] if other != quantity]
     columns = known_columns([name, *others], {}).columns
     assert (columns[quantity].column, columns[quantity].unit) == (name, unit)
 
@@ -58,8 +59,9 @@ def test_a_line_of_units_counts_for_names_without_one() -> None:
     assert found.columns["leader_y"].unit is None
 
 
-def test_a_speed_without_a_turn_rate_is_left_out() -> None:
-    assert "v2" not in known_columns(["t", *POSES, "v2"], {}).columns
+def test_half_a_motion_and_half_a_quaternion_are_left_out() -> None:
+    found = known_columns(["t", *POSES, "v2", "leader_qx", "leader_qy", "follower_qw"], {})
+    assert found == known_columns(["t", *POSES], {})
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,139 @@
+"""``abreast doctor``: the check before anything moves."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from formation.collector import collector_paused
+from hil.commands.daemon import DEFAULT_ENDPOINT
+from hil.commands.seconds import DURATION
+
+if TYPE_CHECKING:
+    from hil.doctor.check import Check
+    from hil.scenario.schema import Scenario
+    from hil.wire.session import Endpoints
+
+_CONFIG = click.Path(path_type=Path, dir_okay=False)
+
+
+@click.command("doctor")
+@click.argument("scenario", default="turtlebot3")
+@click.option("--connect", metavar="ENDPOINT", help=f"Router to connect to [{DEFAULT_ENDPOINT}].")
+@click.option(
+    "--listen", metavar="ENDPOINT", help="Be the router, at this endpoint, for as long as it takes."
+)
+@click.option("--zenoh-config", type=_CONFIG, help="Zenoh config file, in place of both.")
+@click.option("--duration", type=DURATION, default=5.0, show_default=True, help="Seconds to listen.")
+@click.option("--drive", metavar="ROBOT", help="Let this robot creep and turn, after a countdown.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), default=Path("."), help="Where logs are to be written."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the checks as one JSON object on stdout.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key.")
+def command(
+    scenario: str,
+    connect: str | None,
+    listen: str | None,
+    zenoh_config: Path | None,
+    duration: float,
+    drive: str | None,
+    out: Path,
+    as_json: bool,
+    overrides: tuple[str, ...],
+) -> None:
+    """Look at the lab of SCENARIO, and say what is wrong and what to do about it.
+
+    Nothing moves without --drive, and then within 0.05 m/s and 0.3 rad/s. Ends with 1 if a check failed.
+    """
+    with collector_paused():
+        from hil.doctor.machine_checks import disk_check
+        from hil.scenario.files import load_scenario
+        from hil.wire.session import Endpoints
+
+    chosen = load_scenario(scenario, overrides)
+    if not (connect or listen or zenoh_config):
+        connect = DEFAULT_ENDPOINT
+    findings: list[dict[str, Any]] = []
+    checks = [
+        disk_check(out),
+        *_visited(chosen, Endpoints(connect, listen, zenoh_config), duration, drive, findings),
+    ]
+    if as_json:
+        click.echo(json.dumps({"checks": [each.as_dict() for each in checks], "findings": findings}))
+    else:
+        _show(checks)
+    sys.exit(int(not all(each.ok for each in checks)))
+
+
+def _visited(
+    scenario: Scenario,
+    endpoints: Endpoints,
+    duration: float,
+    drive: str | None,
+    findings: list[dict[str, Any]],
+) -> Iterator[Check]:
+    """Checks of all that can be reached by the wire; what estimators find is put to the findings."""
+    with collector_paused():
+        from hil.doctor.machine_checks import port_check, route_check
+        from hil.doctor.visit import Visit, countdown
+        from hil.errors import AbreastError
+        from hil.wire.key_layout import layout_of
+        from hil.wire.pubsub import Wire
+        from hil.wire.session import close_session, open_session
+        from hil.wire.topics import urgent_topics
+
+    if endpoints.listen:
+        taken = port_check(*_place(endpoints.listen))
+        yield taken
+        if not taken.ok:
+            return
+    try:
+        session = open_session(endpoints, patience=3.0)
+    except AbreastError as error:
+        yield route_check(endpoints.describe(), str(error))
+        return
+    wire = Wire(session, urgent_topics(scenario), layout_of(scenario), "doctor")
+    try:
+        yield route_check(endpoints.describe(), "")
+        visit = Visit(scenario, wire)
+        robot = visit.robot(drive) if drive else None
+        click.echo(f"abreast doctor: listens for {duration:g} s", err=True)
+        visit.listen(duration)
+        passive = list(visit.checks())
+        if robot is not None:
+            countdown(lambda line: click.echo(f"abreast doctor: {line}", err=True), robot)
+            driven = visit.drive(robot)
+            passive = [*visit.checks(), *driven]
+        findings += visit.findings()
+        yield from passive
+    finally:
+        wire.close()
+        close_session(session)
+
+
+def _place(endpoint: str) -> tuple[int, str]:
+    host, _, port = endpoint.partition("/")[2].rpartition(":")
+    return int(port) if port.isdigit() else 0, host.strip("[]")
+
+
+def _show(checks: list[Check]) -> None:
+    """A table: what is well in few words, what is not with what to do."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for title in ("", "check", "seen", "expected"):
+        table.add_column(title, overflow="fold")
+    for each in checks:
+        table.add_row(
+            "ok" if each.ok else "[red]no[/red]", each.name, each.seen, "" if each.ok else each.expected
+        )
+        if not each.ok:
+            table.add_row("", "", f"[bold]{each.advice}[/bold]", "")
+    Console().print(table)

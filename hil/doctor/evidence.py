@@ -1,0 +1,120 @@
+"""What is heard in a lab while the doctor listens, kept as numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from formation.pose import Motion, Pose
+from hil.scenario.links import links_of
+from hil.scenario.schema import Scenario
+from hil.wire import message_types as msg
+from hil.wire import topics
+from hil.wire.events import Event
+from hil.wire.message_checks import ACCEPTED, place_cause, planar
+from hil.wire.messages import MalformedPayloadError, decode_as
+from hil.wire.pose_sources import places_of
+from hil.wire.source_topics import all_bodies
+from hil.wire.topics import link_topics
+
+
+class Seen(NamedTuple):
+    """A mocap frame: when it came, its stamp [ns] and number, and the names of all its bodies.
+
+    ``poses``: of those that stand on the ground.
+    """
+
+    at_ns: int
+    stamp_ns: int
+    number: int
+    names: tuple[str, ...]
+    poses: dict[str, Pose]
+
+
+class Rolled(NamedTuple):
+    """Odometry of a robot: when it came, its stamp [ns], and its motion."""
+
+    at_ns: int
+    stamp_ns: int
+    motion: Motion
+
+
+class Asked(NamedTuple):
+    """A command to a robot: when it came, and its stamp [ns], 0 for one that has none."""
+
+    at_ns: int
+    stamp_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A robot of a scenario: its name, body and topics."""
+
+    name: str
+    body: str
+    odom: str
+    cmd_vel: str
+
+
+def robots_of(scenario: Scenario) -> tuple[Robot, ...]:
+    """The robots of a scenario, the leader first."""
+    links = links_of(scenario)
+    pairs = [link_topics(link) for link in links]
+    names = (scenario.leader.name, *(link.follower for link in links))
+    wheels = (pairs[0].leader_odom, *(pair.odom for pair in pairs))
+    drives = (pairs[0].leader_cmd_vel, *(pair.cmd_vel for pair in pairs))
+    return tuple(map(Robot, names, all_bodies(scenario), wheels, drives))
+
+
+@dataclass(slots=True)
+class Evidence:
+    """All that was heard: frames, and odometry and commands by topic. ``unread``: how many made no sense."""
+
+    scenario: Scenario
+    frames: list[Seen] = field(default_factory=list)
+    odometry: dict[str, list[Rolled]] = field(default_factory=dict)
+    commands: dict[str, list[Asked]] = field(default_factory=dict)
+    unread: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def robots(self) -> tuple[Robot, ...]:
+        """The robots that are looked for."""
+        return robots_of(self.scenario)
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """What there is to hear."""
+        robots = self.robots
+        return (topics.RIGID_BODIES, *(each.odom for each in robots), *(each.cmd_vel for each in robots))
+
+    def hear(self, event: Event, now_ns: int) -> None:
+        """Take down a message; what cannot be read is counted."""
+        try:
+            if event.topic == topics.RIGID_BODIES:
+                self.frames.append(_seen(decode_as(event.payload, msg.RigidBodies), now_ns))
+            elif event.topic in {each.odom for each in self.robots}:
+                rolled = _rolled(decode_as(event.payload, msg.Odometry), now_ns)
+                self.odometry.setdefault(event.topic, []).append(rolled)
+            elif event.topic in {each.cmd_vel for each in self.robots}:
+                stamp_ns = 0
+                if self.scenario.controller.command_type == "TwistStamped":
+                    stamp_ns = _stamp_ns(decode_as(event.payload, msg.TwistStamped).header)
+                self.commands.setdefault(event.topic, []).append(Asked(now_ns, stamp_ns))
+        except MalformedPayloadError:
+            self.unread[event.topic] = self.unread.get(event.topic, 0) + 1
+
+
+def _seen(frame: msg.RigidBodies, now_ns: int) -> Seen:
+    places = places_of(frame)
+    sound = {each.body: planar(each.place) for each in places if place_cause(each.place) == ACCEPTED}
+    names = tuple(each.body for each in places)
+    return Seen(now_ns, _stamp_ns(frame.header), frame.frame_number, names, sound)
+
+
+def _rolled(told: msg.Odometry, now_ns: int) -> Rolled:
+    motion = Motion(told.twist.twist.linear.x, told.twist.twist.angular.z)
+    return Rolled(now_ns, _stamp_ns(told.header), motion)
+
+
+def _stamp_ns(header: msg.Header) -> int:
+    return header.stamp.sec * 10**9 + header.stamp.nanosec

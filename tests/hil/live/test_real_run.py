@@ -1,0 +1,110 @@
+"""A run with robots that are not ours: another process is the lab, and tells nobody the truth."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from hil.log.reader import read_log
+from hil.scenario.files import load_scenario
+from hil.wire import message_types as msg
+from hil.wire.messages import decode_as
+from hil.wire.session import reserved_endpoint
+from tests.hil.live.child_run import PATIENCE, Run
+from tests.hil.live.own_poses import off_orbit
+
+pytestmark = pytest.mark.slow
+
+DURATION, FROM = 20.0, 12.0
+
+
+@contextmanager
+def real_run(folder: Path, lab_options: list[str], options: list[str]) -> Iterator[tuple[Run, Path]]:
+    """A run, and where the lab leaves the robots' own poses once the run is over."""
+    table = folder / "poses.csv"
+    with reserved_endpoint() as endpoint:
+        where = ["--listen", endpoint, "--out", str(folder / "run"), "--json"]
+        given = ["--duration", str(DURATION), "--set", f"run.evaluate_from_s={FROM}"]
+        process = subprocess.Popen(
+            [sys.executable, "-m", "hil", "run", "turtlebot3", "--real", *where, *given, *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        lab = subprocess.Popen(
+            [sys.executable, "-m", "tests.hil.live.stranger_lab", endpoint, str(table), *lab_options]
+        )
+        try:
+            yield Run(folder / "run", endpoint, process, 0), table
+            lab.send_signal(signal.SIGTERM)
+            assert lab.wait(30.0) == 0
+        finally:
+            for each in (process, lab):
+                if each.poll() is None:
+                    each.kill()
+                    each.wait()
+
+
+@pytest.mark.parametrize(
+    ("lab", "options"),
+    [
+        ([], ["--countdown", "0.5"]),
+        (["--hand", "4"], ["--leader", "hand"]),
+    ],
+    ids=["program", "hand"],
+)
+def test_the_pair_keeps_to_the_orbit_by_its_own_poses_and_by_the_judge(
+    tmp_path: Path, lab: list[str], options: list[str]
+) -> None:
+    with real_run(tmp_path, lab, options) as (run, table):
+        code, summary, err = run.finish()
+    assert code == 0, err
+    assert run.daemons() == {}
+    rho, _ = off_orbit(table, load_scenario("turtlebot3"), (FROM, DURATION - 0.5))
+    assert rho < 0.003
+    assert summary["truth"] == "mocap"
+    assert summary["formation"]["orbit_deviation_rms"]["rho"] < 0.003
+    assert summary["estimation"]["rmse"]["v1"] < 0.003
+    assert summary["duration_s"] == pytest.approx(DURATION, abs=0.5)
+
+
+@pytest.mark.parametrize("robot", ["leader", "follower"])
+def test_one_robot_may_be_emulated_beside_a_real_one(tmp_path: Path, robot: str) -> None:
+    with real_run(tmp_path, ["--without", robot], ["--emulate", robot]) as (run, _):
+        code, summary, err = run.finish()
+    assert code == 0, err
+    assert summary["truth"] == "mocap"
+    assert summary["formation"]["orbit_deviation_rms"]["rho"] < 0.003
+    assert summary["estimation"]["rmse"]["v1"] < 0.003
+
+
+def test_when_the_leaders_daemon_is_killed_both_robots_stand(tmp_path: Path) -> None:
+    with real_run(tmp_path, [], ["--countdown", "0"]) as (run, table):
+        run.wait_until(lambda: "leader" in run.daemons())
+        with run.listening("leader/cmd_vel") as wire:
+
+            def drives() -> bool:
+                event = wire.inbox.take(0.1)
+                return event is not None and decode_as(event.payload, msg.TwistStamped).twist.linear.x > 0.0
+
+            run.wait_until(drives)
+        os.kill(run.daemons()["leader"], signal.SIGKILL)
+        out, err = run.process.communicate(timeout=PATIENCE)
+    assert run.process.returncode == 1
+    assert "the leader was killed by signal 9" in err
+    assert json.loads(out)["mode"] == "live"
+    last = table.read_text(encoding="utf-8").splitlines()[-1].split(",")
+    assert abs(float(last[7])) < 0.01
+    for topic in ("leader/cmd_vel", "follower/cmd_vel"):
+        final = list(read_log(run.log).records([topic]))[-1]
+        twist = decode_as(final.payload, msg.TwistStamped).twist
+        assert twist.linear.x == twist.angular.z == 0.0
