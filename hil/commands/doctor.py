@@ -106,7 +106,10 @@ def _visited(
         click.echo(f"abreast doctor: listens for {duration:g} s", err=True)
         visit.listen(duration)
         passive = list(visit.checks())
-        if robot is not None:
+        hindrance = visit.hindrance(robot) if robot is not None else None
+        if hindrance is not None:
+            passive.append(hindrance)
+        elif robot is not None:
             countdown(lambda line: click.echo(f"abreast doctor: {line}", err=True), robot)
             driven = visit.drive(robot)
             passive = [*visit.checks(), *driven]
