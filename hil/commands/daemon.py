@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from hil.live.daemon import Ending, Worker
     from hil.live.listener_watch import ListenerWatch
     from hil.live.node_worker import Parting
+    from hil.nodes.node import Node
     from hil.wire.pubsub import Wire
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -190,7 +191,7 @@ def _beside_real(order: Order) -> Worker:
     from hil.live.node_worker import NodeWorker
     from hil.nodes.source import SourceNode
 
-    nodes = [SourceNode(order.scenario, LAB_FRAMES), BesideReal(order.scenario, order.needs)]
+    nodes: list[Node[Any]] = [SourceNode(order.scenario, LAB_FRAMES), BesideReal(order.scenario, order.needs)]
     return NodeWorker(nodes, within=(LAB_FRAMES,), on_report=_on_report(), unspoken=(LAB_FRAMES,))
 
 

@@ -129,14 +129,14 @@ def _show(checks: list[Check]) -> None:
     """A table: what is well in few words, what is not with what to do."""
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     table = Table(box=None, pad_edge=False)
     for title in ("", "check", "seen", "expected"):
         table.add_column(title, overflow="fold")
     for each in checks:
-        table.add_row(
-            "ok" if each.ok else "[red]no[/red]", each.name, each.seen, "" if each.ok else each.expected
-        )
+        mark = Text("ok") if each.ok else Text("no", "red")
+        table.add_row(mark, each.name, Text(each.seen), Text("" if each.ok else each.expected))
         if not each.ok:
-            table.add_row("", "", f"[bold]{each.advice}[/bold]", "")
+            table.add_row("", "", Text(each.advice, "bold"), "")
     Console().print(table)

@@ -46,7 +46,7 @@ def judge_estimation(run_data: RunData, columns: Columns) -> dict[str, object]:
     judged = int(np.count_nonzero(inside(estimates.capture_ns, columns.span)))
     errors = estimate_errors(columns)
     rmse = {name: _rms(error) for name, error in errors.items()}
-    told = {
+    told: dict[str, object] = {
         "evaluated_from_s": (columns.span.from_ns - run_data.zero_ns) / 1e9,
         "samples": len(samples.capture_ns),
         "untracked": judged - len(samples.capture_ns),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from formation.records import load
 from hil.wire import message_types as msg
@@ -70,7 +70,7 @@ def frame_id_in(payload: bytes) -> str:
     >>> frame_id_in(bytes.fromhex("00010000 00000000 00000000 04000000 6d617000"))
     'map'
     """
-    order = "little" if payload[1:2] == b"\x01" else "big"
+    order: Literal["little", "big"] = "little" if payload[1:2] == b"\x01" else "big"
     length = int.from_bytes(payload[_FRAME_ID_AT : _FRAME_ID_AT + 4], order)
     begin = _FRAME_ID_AT + 4
     return payload[begin : begin + min(length, _LONGEST_NAME)].rstrip(b"\0").decode(errors="replace")

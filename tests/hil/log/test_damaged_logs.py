@@ -110,7 +110,8 @@ def test_a_flipped_bit_in_the_first_chunk_costs_that_chunk_alone(
     done, numbers = recovered(bytes(content))
     assert numbers == list(range(last + 1, COUNT))
     assert (done.lost, done.damaged) == (last + 1, True)
-    assert done.gaps_s() == [(0.0, pytest.approx(last * PERIOD_NS * 1e-9))]
+    ((begun_s, ended_s),) = done.gaps_s()
+    assert (begun_s, ended_s) == (0.0, pytest.approx(last * PERIOD_NS * 1e-9))
 
 
 @pytest.mark.parametrize("summary", [True, False])

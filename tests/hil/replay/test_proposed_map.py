@@ -75,7 +75,7 @@ def odometry(topic: str, v: float) -> list[Sent]:
 
 
 def twists(topic: str, v: float) -> list[Sent]:
-    kept = []
+    kept: list[Sent] = []
     for _, message, at_ns in odometry(topic, v):
         assert isinstance(message, msg.Odometry)
         kept.append((topic, message.twist.twist, at_ns))
