@@ -247,10 +247,19 @@ def _follower(order: Order) -> Worker:
 
 
 def _on_report() -> Callable[[bytes], None]:
-    """What says on stderr what nodes find, once when it begins and once when it ends."""
-    from hil.live.finding_lines import FindingLines
+    """What says on stderr what nodes find and wait for, once when it begins and once when it ends."""
+    from hil.live.finding_lines import FindingLines, ProblemLines
 
-    return FindingLines(lambda line: click.echo(line, err=True)).hear
+    def say(line: str) -> None:
+        click.echo(line, err=True)
+
+    findings, problems = FindingLines(say), ProblemLines(say)
+
+    def hear(payload: bytes) -> None:
+        findings.hear(payload)
+        problems.hear(payload)
+
+    return hear
 
 
 def _watch_of(order: Order) -> Callable[[Wire], ListenerWatch]:

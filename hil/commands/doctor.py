@@ -107,8 +107,11 @@ def _visited(
         robot = examination.robot(drive) if drive else None
         click.echo(f"abreast doctor: listens for {duration:g} s", err=True)
         visit.listen(duration)
-        driven = []
-        if robot is not None:
+        driven: list[Check] = []
+        hindrance = examination.hindrance(robot) if robot is not None else None
+        if hindrance is not None:
+            driven = [hindrance]
+        elif robot is not None:
             countdown(lambda line: click.echo(f"abreast doctor: {line}", err=True), robot)
             driven = examination.drive(robot, visit.tell)
         now_ns = time.time_ns()

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from formation.angles import wrapped
+from formation.mount import robot_pose
 from formation.pose import Motion, Pose
 from hil.doctor.check import Check, check
 from hil.doctor.evidence import Evidence, Robot
@@ -32,7 +33,8 @@ _MOST_PIVOT_M = 0.01
 class Moved(NamedTuple):
     """How a robot went while it was told something: by its body and, if there was any, by its odometry.
 
-    ``begin``, ``end``: poses of the body; ``way`` [m] and ``turn`` [rad] by odometry.
+    ``begin``, ``end``: its poses, by where the body is said to sit on it; ``way`` [m], ``turn`` [rad]: by
+    odometry.
     """
 
     begin: Pose
@@ -54,7 +56,7 @@ class Moved(NamedTuple):
 def moved(found: Evidence, robot: Robot, from_ns: int, to_ns: int) -> Moved | None:
     """How a robot went in a span of time; None if its body was not seen."""
     poses = [
-        each.poses[robot.body]
+        robot_pose(each.poses[robot.body], robot.mount)
         for each in found.frames
         if from_ns <= each.at_ns <= to_ns and robot.body in each.poses
     ]
@@ -126,5 +128,5 @@ def _yaw(robot: Robot, straight: Moved) -> Check:
 def _pivot(robot: Robot, turning: Moved) -> Check:
     """A body whose origin is off the wheels' middle goes round it as the robot turns on the spot."""
     radius = turning.distance / (2.0 * abs(math.sin(0.5 * turning.turned)))
-    seen = f"{robot.name}: its body's origin is {1e3 * radius:.0f} mm off the wheels' middle"
+    seen = f"{robot.name}: its body sits {1e3 * radius:.0f} mm off where its mount says"
     return check("frame_pivot", radius <= _MOST_PIVOT_M, seen, "at most 10 mm", advice_on("frame_pivot"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from formation.mount import NO_MOUNT, Mount
 from formation.pose import Motion, Pose
 from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
@@ -48,12 +49,13 @@ class Asked(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """A robot of a scenario: its name, body and topics."""
+    """A robot of a scenario: its name, body and topics, and where the body sits as far as is known."""
 
     name: str
     body: str
     odom: str
     cmd_vel: str
+    mount: Mount = NO_MOUNT
 
 
 def robots_of(scenario: Scenario) -> tuple[Robot, ...]:
@@ -63,7 +65,8 @@ def robots_of(scenario: Scenario) -> tuple[Robot, ...]:
     names = (scenario.leader.name, *(link.follower for link in links))
     wheels = (pairs[0].leader_odom, *(pair.odom for pair in pairs))
     drives = (pairs[0].leader_cmd_vel, *(pair.cmd_vel for pair in pairs))
-    return tuple(map(Robot, names, all_bodies(scenario), wheels, drives))
+    mounts = (Mount(*scenario.leader.mount), *(Mount(*scenario.follower.mount) for _ in links))
+    return tuple(map(Robot, names, all_bodies(scenario), wheels, drives, mounts))
 
 
 @dataclass(slots=True)

@@ -83,6 +83,14 @@ class Examination:
             f"--drive {name!r}: scenario {self.scenario.name} has no such robot; one of: {known}"
         )
 
+    def hindrance(self, robot: Robot) -> Check | None:
+        """Why a robot is not to be driven now, if it is not: it cannot obey two."""
+        others = len(self.found.commands.get(robot.cmd_vel, []))
+        if not others:
+            return None
+        seen = f"{robot.name}: {others} commands of somebody else on {robot.cmd_vel}; it was not driven"
+        return Check("drive", False, seen, "nobody else who commands it", advice_on("second_sender"))
+
     def drive(self, robot: Robot, tell: Tell) -> list[Check]:
         """Let a robot creep and turn, and check what came of it. It is told to stand however this ends."""
         try:

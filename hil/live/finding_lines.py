@@ -1,4 +1,4 @@
-"""Lines for a terminal, when a node begins to find something or no more does, and for what a start waits."""
+"""Lines for a terminal: what nodes begin to find and find no more, and what nodes or a start wait for."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hil.wire.message_types import DiagnosticArray
 from hil.wire.messages import MalformedPayloadError, decode_as
 
 _PREFIX = PREFIX.encode()
-_NUMBER = re.compile(r"[0-9.]+ s\b")
+_NUMBER = re.compile(r"[-+]?[0-9.]+ (s|deg|mm|m)\b|sd [0-9.]+")
 
 
 class FindingLines:
@@ -43,6 +43,36 @@ class FindingLines:
         self._known[node] = dict(findings)
         if not findings:
             del self._known[node]
+
+
+class ProblemLines:
+    """Hears the diagnostics of nodes, and says what each waits for or cannot do, and when that is over.
+
+    Only what two reports in a row say is told: what is there half a second after a start was not waited for.
+    """
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+        self._heard: dict[str, str] = {}
+        self._told: dict[str, str] = {}
+
+    def hear(self, payload: bytes) -> None:
+        """Hear a diagnostics message; what cannot be read is passed over."""
+        try:
+            report = decode_as(payload, DiagnosticArray)
+        except MalformedPayloadError:
+            return
+        for status in report.status:
+            self.note(status.name.removeprefix("abreast/"), "" if status.level == 0 else status.message)
+
+    def note(self, node: str, problem: str) -> None:
+        """Say how a node's problem differs from the one that was told; figures with a unit do not."""
+        counted = _NUMBER.sub("", problem)
+        before, self._heard[node] = self._heard.get(node), counted
+        if counted != before or counted == self._told.get(node, ""):
+            return
+        self._told[node] = counted
+        self._say(f"{node}: {problem}" if problem else f"{node} waits no more")
 
 
 class WaitingLines:

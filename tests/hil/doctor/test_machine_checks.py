@@ -1,3 +1,5 @@
+"""This machine: a full disk, a port that is taken, a router that is not there."""
+
 from __future__ import annotations
 
 import socket
@@ -6,22 +8,26 @@ from pathlib import Path
 from hil.doctor.machine_checks import disk_check, port_check, route_check
 
 
-def test_a_disk_without_room_is_told(tmp_path: Path) -> None:
-    assert disk_check(tmp_path / "logs" / "of today", least_gb=1e-6).ok
+def test_room_is_looked_for_where_the_folder_is_to_be_made(tmp_path: Path) -> None:
+    assert disk_check(tmp_path / "not" / "yet", least_gb=0.0).ok
     full = disk_check(tmp_path, least_gb=1e9)
-    assert (full.name, full.ok) == ("disk", False)
-    assert "room" in full.advice
+    assert not full.ok
+    assert "make room" in full.advice
 
 
-def test_a_port_that_is_taken_is_told() -> None:
-    with socket.socket() as held:
-        held.bind(("127.0.0.1", 0))
-        held.listen()
-        port = held.getsockname()[1]
-        assert not port_check(port).ok
-    assert port_check(0).ok
+def test_a_port_is_taken_while_somebody_listens_there() -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        taken = port_check(port)
+        assert not taken.ok
+        assert f"127.0.0.1:{port} is taken" in taken.seen
+    assert port_check(port).ok
 
 
-def test_a_router_that_is_not_there_is_told() -> None:
-    assert route_check("tcp/127.0.0.1:7447", "").ok
-    assert route_check("tcp/127.0.0.1:7447", "connection refused").seen == "connection refused"
+def test_a_router_that_is_not_reached_has_a_reason() -> None:
+    endpoint = "tcp/127.0.0.1:1"
+    assert route_check(endpoint, "").ok
+    assert route_check(endpoint, "no session").seen == "no session"
+    assert not route_check(endpoint, "no session").ok

@@ -180,7 +180,7 @@ def test_leaders_at_the_end_of_the_world_break_nothing(kind: str, front_end: str
 
 
 def wrong_frames() -> list[tuple[str, bytes]]:
-    quaternion = msg.Quaternion(x=0.0, y=0.0, z=0.0, w=0.0)
+    none = msg.Quaternion(x=0.0, y=0.0, z=0.0, w=0.0)
     nan = msg.Point(x=math.nan, y=0.0, z=0.0)
     good = frame_message(WARM_NS, 1, PAIR)
     leader, follower = good.rigidbodies
@@ -190,10 +190,12 @@ def wrong_frames() -> list[tuple[str, bytes]]:
         return encode(msg.RigidBodies(good.header, 1, [body, follower]))
 
     pose = leader.pose
+    unturned = msg.RigidBody("follower", [], msg.Pose(position=follower.pose.position, orientation=none))
     return [
         ("malformed", b"\x0a\x0b\x0c"),
         ("not_finite", with_leader(msg.Pose(position=nan, orientation=pose.orientation))),
-        ("bad_quaternion", with_leader(msg.Pose(position=pose.position, orientation=quaternion))),
+        # A leader may be a single marker; a follower needs its heading.
+        ("bad_quaternion", encode(msg.RigidBodies(good.header, 1, [leader, unturned]))),
         ("unknown_body", encode(frame_message(WARM_NS, 1, [("cat", PAIR[0][1])]))),
         ("missing_follower", encode(frame_message(WARM_NS, 1, PAIR[:1]))),
         ("same_place", encode(frame_message(WARM_NS, 1, [("leader", PAIR[1][1]), PAIR[1]]))),
@@ -289,7 +291,7 @@ def test_while_measurements_are_missing_it_says_so_by_itself() -> None:
 def test_diagnostics_name_what_is_missing_and_what_was_counted() -> None:
     begun = NODE.begin(EPOCH_NS)
     before = decode_as(NODE.report(begun, EPOCH_NS).payload, msg.DiagnosticArray).status[0]
-    assert (before.level, before.message) == (1, "waiting for mocap")
+    assert (before.level, before.message) == (1, "waiting for mocap: no frame has come on rigid_bodies")
     state, _ = fed([(WARM_NS, Event(topics.RIGID_BODIES, b"?"))], NODE, WARM)
     after = decode_as(NODE.report(state, WARM_NS).payload, msg.DiagnosticArray).status[0]
     values = {value.key: value.value for value in after.values}
@@ -336,3 +338,27 @@ def test_over_a_whole_log_the_compiled_filter_is_filterpys(
             compared += 1
     assert compared > 400
     assert left.taken == right.taken
+
+
+def test_it_says_which_bodies_it_sees_and_wants_and_finds_axes_of_frames_that_are_refused() -> None:
+    """Bodies by other names, then by the right ones with y up, all of them refused."""
+    named = [
+        msg.RigidBody(name, [], msg.Pose(msg.Point(0.0, 0.0, 0.0), msg.Quaternion(0.0, 0.0, 0.0, 1.0)))
+        for name in "12"
+    ]
+    strangers = Event(topics.RIGID_BODIES, encode(msg.RigidBodies(header(EPOCH_NS, "map"), 0, named)))
+    state, _ = fed([(EPOCH_NS, strangers)], NODE, NODE.begin(EPOCH_NS))
+    status = decode_as(NODE.report(state, EPOCH_NS).payload, msg.DiagnosticArray).status[0]
+    assert status.message == "waiting for mocap: no body 'leader', 'follower' among those seen: '1', '2'"
+    assert NODE.findings(state, EPOCH_NS)["bodies"] in status.message
+    for k in range(8):
+        now_ns = EPOCH_NS + (k + 1) * 250_000_000
+        lying = msg.Quaternion(0.0, 0.6, 0.0, 0.8)
+        bodies = [
+            msg.RigidBody(name, [], msg.Pose(msg.Point(x, 0.1, -0.1), lying))
+            for name, x in (("leader", 0.0), ("follower", 0.3))
+        ]
+        frame = encode(msg.RigidBodies(header(now_ns, "map"), k, bodies))
+        state, _ = fed([(now_ns, Event(topics.RIGID_BODIES, frame))], NODE, state)
+    assert "y is up" in NODE.findings(state, now_ns)["axes"]
+    assert "tilted" in state.refused
