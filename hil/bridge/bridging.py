@@ -9,9 +9,8 @@ from typing import Protocol
 from hil.live.daemon import Ending
 from hil.nodes.node import Outgoing
 from hil.scenario.schema import Scenario
-from hil.wire.key_layout import layout_of
-from hil.wire.pubsub import Wire
-from hil.wire.session import Endpoints, close_session, open_session
+from hil.wire.pubsub import Wire, joined
+from hil.wire.session import Endpoints
 
 _LONGEST_WAIT = 0.05
 
@@ -44,9 +43,7 @@ def run_bridge(
 
     The bridge is made once the wire is there, and is given it. Topics lie where the scenario has them.
     """
-    session = open_session(endpoints, give_up=lambda: ending.asked)
-    wire = Wire(session, layout=layout_of(scenario), node="bridge")
-    try:
+    with joined(endpoints, scenario, "bridge", give_up=lambda: ending.asked) as wire:
         bridge = make_bridge(wire)
         try:
             on_ready()
@@ -57,9 +54,6 @@ def run_bridge(
             _publish(wire, bridge.end(time.time_ns()))
         finally:
             bridge.close()
-    finally:
-        wire.close()
-        close_session(session)
 
 
 def _publish(wire: Wire, messages: Iterable[Outgoing]) -> None:

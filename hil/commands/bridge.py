@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
+from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
 from formation.collector import collector_paused
 from hil.bridge.seen_frame import Up
-from hil.commands.daemon import DEFAULT_ENDPOINT
 from hil.commands.seconds import DURATION
+from hil.commands.wire_options import endpoints_of, wire_options
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
 
@@ -19,19 +19,7 @@ if TYPE_CHECKING:
     from hil.bridge.bridging import Bridge
     from hil.wire.pubsub import Wire
 
-F = TypeVar("F", bound=Callable[..., Any])
-
 _KINDS = ("vicon", "qualisys", "vrpn", "optitrack")
-_CONFIG = click.Path(path_type=Path, dir_okay=False)
-_ON_THE_WIRE = (
-    click.argument("scenario", default="turtlebot3"),
-    click.option("--connect", metavar="ENDPOINT", help=f"Router to connect to [{DEFAULT_ENDPOINT}]."),
-    click.option("--listen", metavar="ENDPOINT", help="Be the router, at this endpoint."),
-    click.option("--zenoh-config", type=_CONFIG, help="Zenoh config file, in place of both."),
-    click.option("--duration", type=DURATION, help="End after S seconds."),
-    click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key."),
-    click.option("--tethered", is_flag=True, hidden=True),
-)
 
 
 class _Given(TypedDict):
@@ -51,15 +39,17 @@ def command() -> None:
     """Bring what other systems send to the wire."""
 
 
-def _on_the_wire(function: F) -> F:
-    """Add the options that all bridges have."""
-    for option in reversed(_ON_THE_WIRE):
-        function = option(function)
-    return function
+def _options() -> list[click.Parameter]:
+    """What all bridges are told."""
+    return [
+        click.Argument(["scenario"], default="turtlebot3"),
+        *wire_options(),
+        click.Option(["--duration"], type=DURATION, help="End after S seconds."),
+        click.Option(["--tethered"], is_flag=True, hidden=True),
+    ]
 
 
-@command.command("natnet")
-@_on_the_wire
+@command.command("natnet", params=_options())
 @click.option("--server", required=True, metavar="ADDR", help="Where Motive runs: HOST or HOST:PORT [1510].")
 @click.option("--multicast", is_flag=True, help="Join the multicast group even if Motive says unicast.")
 @click.option("--up", type=click.Choice(["y", "z"]), help="Motive's up axis [the scenario's source.up].")
@@ -77,8 +67,7 @@ def bridge_natnet(server: str, multicast: bool, up: Up | None, **given: Unpack[_
     _run(lambda _: NatNetBridge(place, wire, _say), chosen, given)
 
 
-@command.command("mocap")
-@_on_the_wire
+@command.command("mocap", params=_options())
 @click.option("--type", "kind", required=True, type=click.Choice(_KINDS), help="Which one it is.")
 @click.option("--server", required=True, metavar="ADDR", help="Where it runs: HOST or HOST:PORT.")
 @click.option("--up", type=click.Choice(["y", "z"]), help="Its up axis [the scenario's source.up].")
@@ -94,8 +83,7 @@ def bridge_mocap(kind: str, server: str, up: Up | None, **given: Unpack[_Given])
     _run(lambda _: MotionCaptureBridge(source, f"{kind} {server}", wire), chosen, given)
 
 
-@command.command("ros2")
-@_on_the_wire
+@command.command("ros2", params=_options())
 def bridge_ros2(**given: Unpack[_Given]) -> None:
     """Join a ROS 2 network by rclpy: motion capture and odometry of SCENARIO in, commands out."""
     with collector_paused():
@@ -118,16 +106,12 @@ def _run(make_bridge: Callable[[Wire], Bridge], scenario: Scenario, given: _Give
     with collector_paused():
         from hil.bridge.bridging import run_bridge
         from hil.live.daemon import Ending
-        from hil.wire.session import Endpoints
 
     ending = Ending()
     ending.on_signals()
     if given["tethered"]:
         ending.on_parent_gone()
-    connect, listen, config = given["connect"], given["listen"], given["zenoh_config"]
-    if not (connect or listen or config):
-        connect = DEFAULT_ENDPOINT
-    endpoints = Endpoints(connect, listen, config)
+    endpoints = endpoints_of(given["connect"], given["listen"], given["zenoh_config"])
 
     def say_ready() -> None:
         _say(f"ready, {scenario.name} on {endpoints.describe()}")

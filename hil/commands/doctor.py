@@ -12,31 +12,23 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from formation.collector import collector_paused
-from hil.commands.daemon import DEFAULT_ENDPOINT
 from hil.commands.seconds import DURATION
+from hil.commands.wire_options import endpoints_of, wire_options
 
 if TYPE_CHECKING:
     from hil.doctor.check import Check
     from hil.scenario.schema import Scenario
     from hil.wire.session import Endpoints
 
-_CONFIG = click.Path(path_type=Path, dir_okay=False)
 
-
-@click.command("doctor")
+@click.command("doctor", params=wire_options())
 @click.argument("scenario", default="turtlebot3")
-@click.option("--connect", metavar="ENDPOINT", help=f"Router to connect to [{DEFAULT_ENDPOINT}].")
-@click.option(
-    "--listen", metavar="ENDPOINT", help="Be the router, at this endpoint, for as long as it takes."
-)
-@click.option("--zenoh-config", type=_CONFIG, help="Zenoh config file, in place of both.")
 @click.option("--duration", type=DURATION, default=5.0, show_default=True, help="Seconds to listen.")
 @click.option("--drive", metavar="ROBOT", help="Let this robot creep and turn, after a countdown.")
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("."), help="Where logs are to be written."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the checks as one JSON object on stdout.")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key.")
 def command(
     scenario: str,
     connect: str | None,
@@ -55,15 +47,12 @@ def command(
     with collector_paused():
         from hil.doctor.machine_checks import disk_check
         from hil.scenario.files import load_scenario
-        from hil.wire.session import Endpoints
 
     chosen = load_scenario(scenario, overrides)
-    if not (connect or listen or zenoh_config):
-        connect = DEFAULT_ENDPOINT
     findings: list[dict[str, Any]] = []
     checks = [
         disk_check(out),
-        *_visited(chosen, Endpoints(connect, listen, zenoh_config), duration, drive, findings),
+        *_visited(chosen, endpoints_of(connect, listen, zenoh_config), duration, drive, findings),
     ]
     if as_json:
         click.echo(json.dumps({"checks": [each.as_dict() for each in checks], "findings": findings}))
@@ -82,12 +71,10 @@ def _visited(
     """Checks of all that can be reached by the wire; what estimators find is put to the findings."""
     with collector_paused():
         from hil.doctor.machine_checks import port_check, route_check
-        from hil.doctor.visit import Visit, countdown
-        from hil.errors import AbreastError
+        from hil.doctor.visit import Visit
         from hil.wire.key_layout import layout_of
-        from hil.wire.pubsub import Wire
-        from hil.wire.session import close_session, open_session
-        from hil.wire.topics import urgent_topics
+        from hil.wire.pubsub import joined
+        from hil.wire.session import NoRouterError
 
     if endpoints.listen:
         taken = port_check(*_place(endpoints.listen))
@@ -95,32 +82,30 @@ def _visited(
         if not taken.ok:
             return
     try:
-        session = open_session(endpoints, patience=3.0)
-    except AbreastError as error:
+        with joined(endpoints, scenario, "doctor", patience=3.0) as wire:
+            yield route_check(endpoints.describe(), "")
+            visit = Visit(scenario, wire)
+            examination = visit.examination
+            robot = examination.robot(drive) if drive else None
+            _say(f"listens for {duration:g} s")
+            visit.listen(duration)
+            driven: list[Check] = []
+            hindrance = examination.hindrance(robot) if robot is not None else None
+            if hindrance is not None:
+                driven = [hindrance]
+            elif robot is not None:
+                visit.count_down(robot, _say)
+                driven = examination.drive(robot, visit.tell)
+            now_ns = time.time_ns()
+            findings += examination.findings(now_ns)
+            yield from examination.checks(wire.graph(), layout_of(scenario), now_ns)
+            yield from driven
+    except NoRouterError as error:
         yield route_check(endpoints.describe(), str(error))
-        return
-    wire = Wire(session, urgent_topics(scenario), layout_of(scenario), "doctor")
-    try:
-        yield route_check(endpoints.describe(), "")
-        visit, layout = Visit(scenario, wire), layout_of(scenario)
-        examination = visit.examination
-        robot = examination.robot(drive) if drive else None
-        click.echo(f"abreast doctor: listens for {duration:g} s", err=True)
-        visit.listen(duration)
-        driven: list[Check] = []
-        hindrance = examination.hindrance(robot) if robot is not None else None
-        if hindrance is not None:
-            driven = [hindrance]
-        elif robot is not None:
-            countdown(lambda line: click.echo(f"abreast doctor: {line}", err=True), robot)
-            driven = examination.drive(robot, visit.tell)
-        now_ns = time.time_ns()
-        findings += examination.findings(now_ns)
-        yield from examination.checks(wire.graph(), layout, now_ns)
-        yield from driven
-    finally:
-        wire.close()
-        close_session(session)
+
+
+def _say(line: str) -> None:
+    click.echo(f"abreast doctor: {line}", err=True)
 
 
 def _place(endpoint: str) -> tuple[int, str]:

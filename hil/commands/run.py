@@ -12,9 +12,9 @@ from typing import Any
 import click
 
 from formation.collector import collector_paused
-from hil.commands.daemon import DEFAULT_ENDPOINT
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION, Seconds
+from hil.commands.wire_options import DEFAULT_ENDPOINT
 from hil.errors import CheckFailedError, UsageError
 from hil.judge.made_by import law_failure
 from hil.live.crew import Crew

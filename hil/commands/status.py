@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from hil.commands.daemon import DEFAULT_ENDPOINT
+from hil.commands.wire_options import endpoints_of, wire_options
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -18,16 +19,12 @@ if TYPE_CHECKING:
 
 _FIRST_LOOK_S = 1.5
 _REFRESH_S = 0.25
-_CONFIG = click.Path(path_type=Path, dir_okay=False)
 
 
-@click.command("status")
+@click.command("status", params=wire_options(listens=False))
 @click.argument("scenario", default="turtlebot3")
-@click.option("--connect", metavar="ENDPOINT", help=f"Router to connect to [{DEFAULT_ENDPOINT}].")
-@click.option("--zenoh-config", type=_CONFIG, help="Zenoh config file, in its place.")
 @click.option("--once", is_flag=True, help="Look for a moment, print, and end.")
 @click.option("--json", "as_json", is_flag=True, help="The same as one JSON object on stdout.")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key.")
 def command(
     scenario: str,
     connect: str | None,
@@ -42,33 +39,26 @@ def command(
 
     from hil.live.lab_state import LabState, hear_for
     from hil.scenario.files import load_scenario
-    from hil.wire.key_layout import layout_of
-    from hil.wire.pubsub import Wire
-    from hil.wire.session import Endpoints, close_session, open_session
+    from hil.wire.pubsub import joined
 
     chosen = load_scenario(scenario, overrides)
     state = LabState(chosen)
-    endpoints = Endpoints(None if zenoh_config else connect or DEFAULT_ENDPOINT, None, zenoh_config)
-    session = open_session(endpoints, patience=3.0)
-    wire = Wire(session, layout=layout_of(chosen))
-    try:
+    clock = time.monotonic
+    endpoints = endpoints_of(connect, None, zenoh_config)
+    with joined(endpoints, chosen, patience=3.0) as wire, suppress(KeyboardInterrupt):
         wire.subscribe(state.topics, shown=False)
-        take, clock = wire.inbox.take, time.monotonic
+        take = wire.inbox.take
         hear_for(state, take, clock, clock() + _FIRST_LOOK_S)
         if as_json:
             click.echo(json.dumps(state.as_dict(clock())))
-        elif once:
+            return
+        if once:
             Console().print(_table(state, clock()))
-        else:
-            with Live(_table(state, clock()), auto_refresh=False) as shown:
-                while True:
-                    hear_for(state, take, clock, clock() + _REFRESH_S)
-                    shown.update(_table(state, clock()), refresh=True)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        wire.close()
-        close_session(session)
+            return
+        with Live(_table(state, clock()), auto_refresh=False) as shown:
+            while True:
+                hear_for(state, take, clock, clock() + _REFRESH_S)
+                shown.update(_table(state, clock()), refresh=True)
 
 
 def _table(state: LabState, now: float) -> Table:

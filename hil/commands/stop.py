@@ -8,21 +8,17 @@ from pathlib import Path
 
 import click
 
-from hil.commands.daemon import DEFAULT_ENDPOINT
+from hil.commands.wire_options import endpoints_of, wire_options
 
 _REPEAT_S = 0.1
 _TIMES = 5
 _PATIENCE_S = 2.0
 _LOOK_S = 0.3
-_CONFIG = click.Path(path_type=Path, dir_okay=False)
 
 
-@click.command("stop")
+@click.command("stop", params=wire_options(listens=False))
 @click.argument("reason", default="stopped by hand")
 @click.option("--scenario", default="turtlebot3", show_default=True, help="Whose robots: a name or a file.")
-@click.option("--connect", metavar="ENDPOINT", help=f"Router to connect to [{DEFAULT_ENDPOINT}].")
-@click.option("--zenoh-config", type=_CONFIG, help="Zenoh config file, in its place.")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key.")
 def command(
     reason: str, scenario: str, connect: str | None, zenoh_config: Path | None, overrides: tuple[str, ...]
 ) -> None:
@@ -35,20 +31,14 @@ def command(
     from hil.scenario.files import load_scenario
     from hil.scenario.links import links_of
     from hil.wire import topics
-    from hil.wire.key_layout import layout_of
     from hil.wire.message_types import String
     from hil.wire.messages import encode
-    from hil.wire.pubsub import Wire
-    from hil.wire.session import Endpoints, close_session, open_session
-    from hil.wire.topics import urgent_topics
+    from hil.wire.pubsub import joined
 
     chosen = load_scenario(scenario, overrides)
     state, links = LabState(chosen), links_of(chosen)
-    endpoints = Endpoints(None if zenoh_config else connect or DEFAULT_ENDPOINT, None, zenoh_config)
-    session = open_session(endpoints, patience=3.0)
-    wire = Wire(session, urgent_topics(chosen), layout_of(chosen), "stop")
     clock = time.monotonic
-    try:
+    with joined(endpoints_of(connect, None, zenoh_config), chosen, "stop", patience=3.0) as wire:
         wire.subscribe(state.robots, shown=False)
         for _ in range(_TIMES):
             wire.publish(topics.STOP, encode(String(data=reason)))
@@ -59,9 +49,6 @@ def command(
         until = clock() + _PATIENCE_S
         while (driven := state.driven(clock())) and clock() < until:
             hear_for(state, wire.inbox.take, clock, clock() + _LOOK_S)
-    finally:
-        wire.close()
-        close_session(session)
     if driven:
         click.echo(
             f"abreast stop: somebody still drives {', '.join(driven)}; use the robot's switch", err=True

@@ -25,7 +25,7 @@ def robot_checks(found: Evidence, graph: Sequence[Endpoint], layout: KeyLayout) 
         yield _odometry(found, robot, rolled)
         if rolled:
             yield _odometry_clock(robot, rolled)
-        yield from _listener(robot, graph, layout)
+        yield from _listener(robot, graph, layout, may_be_deaf=robot == found.robots[0])
         yield _one_sender(found, robot, graph, layout)
 
 
@@ -56,13 +56,20 @@ def _odometry_clock(robot: Robot, rolled: Sequence[Rolled]) -> Check:
     return check("odometry_clock", ok, seen, expected, "set the robot's clock by chrony, as of all machines")
 
 
-def _listener(robot: Robot, graph: Sequence[Endpoint], layout: KeyLayout) -> Iterator[Check]:
-    """Whether the robot hears its commands, where it shows in the graph at all."""
+def _listener(
+    robot: Robot, graph: Sequence[Endpoint], layout: KeyLayout, *, may_be_deaf: bool
+) -> Iterator[Check]:
+    """Whether the robot hears its commands, where it shows in the graph at all.
+
+    ``may_be_deaf``: that of the leader, who may be driven by hand.
+    """
     told, odom = (layout.within(layout.name(topic)) for topic in (robot.cmd_vel, robot.odom))
     if not any(each.publishes and each.key == odom for each in graph):
         return
     heard_as = [each.typename for each in graph if not each.publishes and each.key == told]
     typename = layout.types[robot.cmd_vel]
+    if may_be_deaf and not heard_as:
+        return
     wrong = listener_findings(f"/{layout.name(robot.cmd_vel)}", typename, heard_as)
     for name, text in wrong.items():
         yield Check(name, False, text, f"the robot listens for {typename}", advice_on(name))

@@ -5,16 +5,23 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from formation.pose import Motion
+from formation.pose import STANDSTILL, Motion
 from hil.doctor.drive_checks import CREEP, CREEP_S, REST_S, TURN, TURN_S, Span
 from hil.doctor.evidence import Robot
 from hil.doctor.examination import Examination
+from hil.errors import AbreastError
 from hil.scenario.schema import Scenario
 from hil.wire.drive_message import drive_message
-from hil.wire.messages import encode
+from hil.wire.message_types import String
+from hil.wire.messages import MalformedPayloadError, decode_as, encode
 from hil.wire.pubsub import Wire
+from hil.wire.topics import STOP
 
 _TICK_S = 0.02
+
+
+class StoppedError(AbreastError):
+    """Somebody said stop while a robot was driven."""
 
 
 class Visit:
@@ -23,8 +30,8 @@ class Visit:
     def __init__(self, scenario: Scenario, wire: Wire) -> None:
         self.examination = Examination(scenario, time.time_ns())
         self._stamped = scenario.controller.command_type == "TwistStamped"
-        self._wire = wire
-        wire.subscribe(self.examination.subscribes, shown=False)
+        self._wire, self._stop = wire, b""
+        wire.subscribe((*self.examination.subscribes, STOP), shown=False)
         wire.watch_graph()
 
     def listen(self, seconds: float) -> None:
@@ -32,27 +39,40 @@ class Visit:
         until, ticked = time.monotonic() + seconds, 0.0
         while (left := until - time.monotonic()) > 0.0:
             event = self._wire.inbox.take(min(left, _TICK_S))
-            if event is not None and event.topic:
+            if event is not None and event.topic == STOP:
+                self._stop = event.payload
+            elif event is not None and event.topic:
                 self.examination.hear(event, time.time_ns())
             if time.monotonic() >= ticked:
                 ticked = time.monotonic() + _TICK_S
                 self.examination.tick(time.time_ns())
 
+    def count_down(self, robot: Robot, say: Callable[[str], None], seconds: int = 3) -> None:
+        """Say what is about to happen, and let it be stopped."""
+        way, turn = CREEP.v * CREEP_S, TURN.u * TURN_S
+        say(f"{robot.name} will creep {way:.2f} m ahead and turn {turn:.1f} rad to the left")
+        for left in range(seconds, 0, -1):
+            say(f"in {left} (Ctrl-C or abreast stop ends it)")
+            self.listen(1.0)
+
     def tell(self, robot: Robot, motion: Motion, seconds: float) -> Span:
-        """Tell a robot to move for a while; the span of time of it, from when it had time to get going."""
+        """Tell a robot to move for a while; the span of time of it, from when it had time to get going.
+
+        Raises :class:`StoppedError` where it is to move and somebody says stop meanwhile.
+        """
         begun_ns, until = time.time_ns(), time.monotonic() + seconds
         frame = robot.cmd_vel.rpartition("/")[0]
         while time.monotonic() < until:
+            if self._stop and motion != STANDSTILL:
+                raise StoppedError(f"{robot.name} stands: somebody said stop ({_reason(self._stop)})")
             told = drive_message(motion, time.time_ns(), frame, stamped=self._stamped)
             self._wire.publish(robot.cmd_vel, encode(told))
             self.listen(_TICK_S)
         return begun_ns + round(REST_S * 1e9), time.time_ns()
 
 
-def countdown(say: Callable[[str], None], robot: Robot, seconds: int = 3) -> None:
-    """Say what is about to happen, and let it be stopped."""
-    way, turn = CREEP.v * CREEP_S, TURN.u * TURN_S
-    say(f"{robot.name} will creep {way:.2f} m ahead and turn {turn:.1f} rad to the left")
-    for left in range(seconds, 0, -1):
-        say(f"in {left} (Ctrl-C stops)")
-        time.sleep(1.0)
+def _reason(stop: bytes) -> str:
+    try:
+        return decode_as(stop, String).data
+    except MalformedPayloadError:
+        return "unreadable"

@@ -16,10 +16,8 @@ from hil.live.listener_watch import ListenerWatch
 from hil.nodes.node import Outgoing
 from hil.scenario.schema import Scenario
 from hil.wire.events import TICK, Event
-from hil.wire.key_layout import layout_of
-from hil.wire.pubsub import Inbox, Wire
-from hil.wire.session import Endpoints, close_session, open_session
-from hil.wire.topics import urgent_topics
+from hil.wire.pubsub import Inbox, Wire, joined
+from hil.wire.session import Endpoints
 
 _LONGEST_WAIT = 0.1
 _LINGER = 0.05
@@ -117,9 +115,7 @@ def run_daemon(
     one at a time in order of arrival; ``now`` is the host clock when one is taken. Topics lie where the
     scenario has them. Returns how many arrivals found the inbox full and were dropped.
     """
-    session = open_session(endpoints, give_up=lambda: ending.asked)
-    wire = Wire(session, urgent_topics(scenario), layout_of(scenario), presence.name)
-    try:
+    with joined(endpoints, scenario, presence.name, give_up=lambda: ending.asked) as wire:
         ending.notify(wire.wake)
         worker = make_worker()
         worker.begin(time.time_ns())
@@ -138,9 +134,6 @@ def run_daemon(
             raise
         _part(worker, wire)
         return wire.inbox.dropped
-    finally:
-        wire.close()
-        close_session(session)
 
 
 def aftermath(inbox: Inbox, worker: Worker) -> Iterator[Iterable[Outgoing]]:

@@ -7,15 +7,18 @@ import queue
 import struct
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import zenoh
 
+from hil.scenario.schema import Scenario
 from hil.wire.events import TICK, Event
-from hil.wire.key_layout import OURS, KeyLayout
+from hil.wire.key_layout import OURS, KeyLayout, layout_of
 from hil.wire.ros_tokens import Endpoint, all_tokens, endpoint_in, endpoint_token, node_token
-from hil.wire.topics import STOP
+from hil.wire.session import Endpoints, close_session, open_session
+from hil.wire.topics import STOP, urgent_topics
 
 INBOX_LIMIT = 100_000
 """Payloads kept waiting at most; more than this is dropped and counted, so that memory stays bounded."""
@@ -189,3 +192,24 @@ class Wire:
 
     def _show(self, token: str) -> None:
         self._tokens.append(self._session.liveliness().declare_token(token))
+
+
+@contextmanager
+def joined(
+    endpoints: Endpoints,
+    scenario: Scenario,
+    node: str = "",
+    patience: float = 10.0,
+    give_up: Callable[[], bool] = lambda: False,
+) -> Iterator[Wire]:
+    """The wire of a scenario's lab for as long as the block lasts. ``node``: what the ROS graph shows of us.
+
+    The rest is as of :func:`hil.wire.session.open_session`, and so is what it raises.
+    """
+    session = open_session(endpoints, patience, give_up)
+    wire = Wire(session, urgent_topics(scenario), layout_of(scenario), node)
+    try:
+        yield wire
+    finally:
+        wire.close()
+        close_session(session)

@@ -22,6 +22,10 @@ _RETRY_S = 0.2
 _CLOSE_S = 2.0
 
 
+class NoRouterError(AbreastError):
+    """Nobody answered, or nobody can listen, at an endpoint."""
+
+
 @dataclass(frozen=True, slots=True)
 class Endpoints:
     """Where a session connects to and listens, such as ``tcp/192.0.2.7:7447``; or a Zenoh config file.
@@ -51,7 +55,7 @@ def open_session(
 ) -> zenoh.Session:
     """Open a session, trying again for ``patience`` [s] while nobody answers, or until ``give_up`` says so.
 
-    Raises :class:`UsageError` for a config that Zenoh refuses, :class:`AbreastError` if nobody answered.
+    Raises :class:`UsageError` for a config that Zenoh refuses, :class:`NoRouterError` if nobody answered.
     """
     config = _config(endpoints)
     deadline = time.monotonic() + patience
@@ -61,7 +65,7 @@ def open_session(
         except zenoh.ZError as error:
             if endpoints.connect is None or time.monotonic() >= deadline or give_up():
                 reason = str(error).partition(" at /")[0]
-                raise AbreastError(
+                raise NoRouterError(
                     f"zenoh {endpoints.describe()}: no session ({reason}); "
                     "is the router up, and is the endpoint right?"
                 ) from None

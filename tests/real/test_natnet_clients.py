@@ -20,8 +20,8 @@ from hil.wire import topics
 from hil.wire.message_types import RigidBodies
 from hil.wire.messages import decode_as
 from hil.wire.pubsub import Wire
-from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
 from tests.real.ros_lab import HERE, peer
+from tests.routers import router
 
 pytestmark = pytest.mark.slow
 
@@ -50,19 +50,6 @@ def emulator(version: str) -> Iterator[int]:
         process.terminate()
         _, rest = process.communicate(timeout=PATIENCE)
     assert (process.returncode, rest) == (0, "")
-
-
-@contextmanager
-def router() -> Iterator[tuple[str, Wire]]:
-    """A router on loopback, and an ear on it."""
-    with reserved_endpoint() as endpoint:
-        session = open_session(Endpoints(listen=endpoint))
-        wire = Wire(session)
-        try:
-            yield endpoint, wire
-        finally:
-            wire.close()
-            close_session(session)
 
 
 def read_by(python: Path, script: str, *arguments: str) -> dict[str, Any]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -13,22 +11,10 @@ from hil.nodes.findings import findings_in
 from hil.wire import message_types as msg
 from hil.wire.messages import decode_as, encode, header
 from hil.wire.pubsub import Wire
-from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
 from tests.real.ros_lab import Lab, bridge, standing
+from tests.routers import router
 
 pytestmark = pytest.mark.slow
-
-
-@contextmanager
-def router() -> Iterator[tuple[str, Wire]]:
-    with reserved_endpoint() as endpoint:
-        session = open_session(Endpoints(listen=endpoint))
-        wire = Wire(session)
-        try:
-            yield endpoint, wire
-        finally:
-            wire.close()
-            close_session(session)
 
 
 def twist(v: float, u: float) -> msg.Twist:

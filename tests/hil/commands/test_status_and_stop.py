@@ -10,22 +10,17 @@ import pytest
 
 from formation.pose import Motion
 from hil.wire.drive_message import drive_message
-from hil.wire.message_types import String
+from hil.wire.message_types import String, TwistStamped
 from hil.wire.messages import decode_as, encode
 from hil.wire.pubsub import Wire
-from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
+from hil.wire.session import reserved_endpoint
+from tests.routers import router
 
 
 @pytest.fixture
 def lab() -> Iterator[tuple[str, Wire]]:
-    with reserved_endpoint() as endpoint:
-        session = open_session(Endpoints(listen=endpoint))
-        wire = Wire(session)
-        try:
-            yield endpoint, wire
-        finally:
-            wire.close()
-            close_session(session)
+    with router() as found:
+        yield found
 
 
 def ran(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -82,3 +77,24 @@ def test_without_a_router_there_is_nobody_to_ask(command: str) -> None:
         done = ran(command, "--connect", endpoint)
     assert done.returncode == 1
     assert "is the router up" in done.stderr
+
+
+def test_a_doctor_who_lets_a_robot_creep_heeds_a_stop(lab: tuple[str, Wire]) -> None:
+    endpoint, wire = lab
+    wire.subscribe(["follower/cmd_vel"])
+    asked = ["doctor", "--drive", "follower", "--duration", "0.5", "--connect", endpoint]
+    doctor = subprocess.Popen(
+        [sys.executable, "-m", "hil", *asked], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    told = []
+    while (event := wire.inbox.take(60.0)) is not None:
+        told.append(decode_as(event.payload, TwistStamped).twist.linear.x)
+        if len(told) == 5:
+            wire.publish("stop", encode(String(data="enough")))
+        if len(told) > 5 and told[-1] == 0.0:
+            break
+    _, said = doctor.communicate(timeout=60.0)
+    assert max(told) == 0.05
+    assert len(told) < 60
+    assert doctor.returncode == 1
+    assert "follower stands: somebody said stop (enough)" in said

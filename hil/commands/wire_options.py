@@ -1,0 +1,35 @@
+"""Options of all commands that join the wire of a lab."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from hil.wire.session import Endpoints
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+def wire_options(*, listens: bool = True) -> list[click.Parameter]:
+    """``--connect``, ``--listen`` where a command may be the router, ``--zenoh-config`` and ``--set``."""
+    config = click.Path(path_type=Path, dir_okay=False)
+    instead = "Zenoh config file, in place of both." if listens else "Zenoh config file, in its place."
+    listen = click.Option(["--listen"], metavar="ENDPOINT", help="Be the router, at this endpoint.")
+    return [
+        click.Option(["--connect"], metavar="ENDPOINT", help=f"Router to connect to [{DEFAULT_ENDPOINT}]."),
+        *([listen] if listens else []),
+        click.Option(["--zenoh-config"], type=config, help=instead),
+        click.Option(["--set", "overrides"], multiple=True, metavar="KEY=VALUE", help="Override a key."),
+    ]
+
+
+def endpoints_of(connect: str | None, listen: str | None, zenoh_config: Path | None) -> Endpoints:
+    """Endpoints that were given, or the one on loopback where none was."""
+    from hil.wire.session import Endpoints
+
+    if not (connect or listen or zenoh_config):
+        connect = DEFAULT_ENDPOINT
+    return Endpoints(connect, listen, zenoh_config)
