@@ -35,8 +35,8 @@ def records() -> Iterator[type]:
 def held_types(record: type) -> list[Any]:
     """Types of a record's fields, for a dataclass or a named tuple."""
     names = [each.name for each in fields(record)] if is_dataclass(record) else record._fields  # type: ignore[attr-defined]
-    # Classes that rosbags generates name ClassVar without importing it.
-    hints = typing.get_type_hints(record, localns={"ClassVar": ClassVar})
+    # Classes that rosbags generates name both without importing them.
+    hints = typing.get_type_hints(record, localns={"ClassVar": ClassVar, "np": np})
     return [hints[name] for name in names]
 
 

@@ -13,8 +13,9 @@ from formation.angles import wrapped
 from formation.mount import robot_pose
 from formation.pose import Motion, Pose
 from hil.doctor.check import Check, check
-from hil.doctor.evidence import Evidence, Robot
+from hil.doctor.evidence import Evidence
 from hil.nodes.findings import advice_on
+from hil.wire.lab_robots import LabRobot
 
 Span = tuple[int, int]
 """Begin and end of a span of time [ns]."""
@@ -53,7 +54,7 @@ class Moved(NamedTuple):
         return wrapped(self.end.theta - self.begin.theta)
 
 
-def moved(found: Evidence, robot: Robot, from_ns: int, to_ns: int) -> Moved | None:
+def moved(found: Evidence, robot: LabRobot, from_ns: int, to_ns: int) -> Moved | None:
     """How a robot went in a span of time; None if its body was not seen."""
     poses = [
         robot_pose(each.poses[robot.body], robot.mount)
@@ -70,7 +71,7 @@ def moved(found: Evidence, robot: Robot, from_ns: int, to_ns: int) -> Moved | No
     return Moved(poses[0], poses[-1], way, turn)
 
 
-def drive_checks(found: Evidence, robot: Robot, ahead: Span, around: Span) -> Iterator[Check]:
+def drive_checks(found: Evidence, robot: LabRobot, ahead: Span, around: Span) -> Iterator[Check]:
     """Checks of a robot that was told :data:`CREEP` and :data:`TURN` in these spans of time [ns]."""
     straight, turning = moved(found, robot, *ahead), moved(found, robot, *around)
     others = [each for each in found.robots if each != robot]
@@ -87,7 +88,7 @@ def drive_checks(found: Evidence, robot: Robot, ahead: Span, around: Span) -> It
     yield _pivot(robot, turning)
 
 
-def _answers(found: Evidence, robot: Robot, others: list[Robot], ahead: Span) -> Check:
+def _answers(found: Evidence, robot: LabRobot, others: list[LabRobot], ahead: Span) -> Check:
     """Whether the body moved that was to move, and none else."""
     own = moved(found, robot, *ahead)
     went = own.distance if own is not None else 0.0
@@ -101,7 +102,7 @@ def _answers(found: Evidence, robot: Robot, others: list[Robot], ahead: Span) ->
     return check("deaf_robot", went >= _LEAST_M, seen, f"at least {_LEAST_M:g} m", advice_on("deaf_robot"))
 
 
-def _odometry(robot: Robot, straight: Moved, turning: Moved) -> Iterator[Check]:
+def _odometry(robot: LabRobot, straight: Moved, turning: Moved) -> Iterator[Check]:
     for name, told, true in (("v2", straight.way, straight.distance), ("u2", turning.turn, turning.turned)):
         if told is None:
             yield Check(
@@ -118,14 +119,14 @@ def _odometry(robot: Robot, straight: Moved, turning: Moved) -> Iterator[Check]:
         yield check(f"odometry_{name}", ok, seen, "1.0", advice_on("odometry_contradicts"))
 
 
-def _yaw(robot: Robot, straight: Moved) -> Check:
+def _yaw(robot: LabRobot, straight: Moved) -> Check:
     way = math.atan2(straight.end.y - straight.begin.y, straight.end.x - straight.begin.x)
     off = wrapped(straight.begin.theta + 0.5 * straight.turned - way)
     seen = f"{robot.name}: its body looks {math.degrees(off):+.1f} deg off its way"
     return check("frame_yaw", abs(off) <= _MOST_YAW, seen, "at most 5 deg", advice_on("frame_yaw"))
 
 
-def _pivot(robot: Robot, turning: Moved) -> Check:
+def _pivot(robot: LabRobot, turning: Moved) -> Check:
     """A body whose origin is off the wheels' middle goes round it as the robot turns on the spot."""
     radius = turning.distance / (2.0 * abs(math.sin(0.5 * turning.turned)))
     seen = f"{robot.name}: its body sits {1e3 * radius:.0f} mm off where its mount says"

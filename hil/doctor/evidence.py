@@ -5,18 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from formation.mount import NO_MOUNT, Mount
 from formation.pose import Motion, Pose
-from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.events import Event
+from hil.wire.lab_robots import LabRobot, robots_of
 from hil.wire.message_checks import ACCEPTED, place_cause, planar
 from hil.wire.messages import MalformedPayloadError, decode_as
 from hil.wire.pose_sources import places_of
-from hil.wire.source_topics import all_bodies
-from hil.wire.topics import link_topics
 
 
 class Seen(NamedTuple):
@@ -47,28 +44,6 @@ class Asked(NamedTuple):
     stamp_ns: int
 
 
-@dataclass(frozen=True, slots=True)
-class Robot:
-    """A robot of a scenario: its name, body and topics, and where the body sits as far as is known."""
-
-    name: str
-    body: str
-    odom: str
-    cmd_vel: str
-    mount: Mount = NO_MOUNT
-
-
-def robots_of(scenario: Scenario) -> tuple[Robot, ...]:
-    """The robots of a scenario, the leader first."""
-    links = links_of(scenario)
-    pairs = [link_topics(link) for link in links]
-    names = (scenario.leader.name, *(link.follower for link in links))
-    wheels = (pairs[0].leader_odom, *(pair.odom for pair in pairs))
-    drives = (pairs[0].leader_cmd_vel, *(pair.cmd_vel for pair in pairs))
-    mounts = (Mount(*scenario.leader.mount), *(Mount(*scenario.follower.mount) for _ in links))
-    return tuple(map(Robot, names, all_bodies(scenario), wheels, drives, mounts))
-
-
 @dataclass(slots=True)
 class Evidence:
     """All that was heard: frames, and odometry and commands by topic. ``unread``: how many made no sense."""
@@ -78,11 +53,10 @@ class Evidence:
     odometry: dict[str, list[Rolled]] = field(default_factory=dict)
     commands: dict[str, list[Asked]] = field(default_factory=dict)
     unread: dict[str, int] = field(default_factory=dict)
+    robots: tuple[LabRobot, ...] = field(init=False)
 
-    @property
-    def robots(self) -> tuple[Robot, ...]:
-        """The robots that are looked for."""
-        return robots_of(self.scenario)
+    def __post_init__(self) -> None:
+        self.robots = robots_of(self.scenario)
 
     @property
     def topics(self) -> tuple[str, ...]:

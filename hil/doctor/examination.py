@@ -8,7 +8,7 @@ from typing import Any
 from formation.pose import STANDSTILL, Motion
 from hil.doctor.check import Check
 from hil.doctor.drive_checks import CREEP, CREEP_S, REST_S, TURN, TURN_S, Span, drive_checks
-from hil.doctor.evidence import Evidence, Robot
+from hil.doctor.evidence import Evidence
 from hil.doctor.frame_checks import frame_checks
 from hil.doctor.robot_checks import robot_checks
 from hil.errors import UsageError
@@ -18,10 +18,11 @@ from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
 from hil.wire.events import TICK, Event
 from hil.wire.key_layout import KeyLayout
+from hil.wire.lab_robots import LabRobot
 from hil.wire.ros_tokens import Endpoint
 from hil.wire.topics import RIGID_BODIES
 
-Tell = Callable[[Robot, Motion, float], Span]
+Tell = Callable[[LabRobot, Motion, float], Span]
 """Tells a robot to move for a while [s], and gives the span of time in which it did."""
 
 
@@ -73,7 +74,7 @@ class Examination:
         found = (node.findings(state, now_ns) for node, state in self._estimators)
         return [each for findings in found for each in findings_json(findings)]
 
-    def robot(self, name: str) -> Robot:
+    def robot(self, name: str) -> LabRobot:
         """The robot of a name, a body or a namespace; :class:`UsageError` if there is none."""
         for robot in self.found.robots:
             if name in (robot.name, robot.body, robot.cmd_vel.rpartition("/")[0]):
@@ -83,7 +84,7 @@ class Examination:
             f"--drive {name!r}: scenario {self.scenario.name} has no such robot; one of: {known}"
         )
 
-    def hindrance(self, robot: Robot) -> Check | None:
+    def hindrance(self, robot: LabRobot) -> Check | None:
         """Why a robot is not to be driven now, if it is not: it cannot obey two."""
         others = len(self.found.commands.get(robot.cmd_vel, []))
         if not others:
@@ -91,7 +92,7 @@ class Examination:
         seen = f"{robot.name}: {others} commands of somebody else on {robot.cmd_vel}; it was not driven"
         return Check("drive", False, seen, "nobody else who commands it", advice_on("second_sender"))
 
-    def drive(self, robot: Robot, tell: Tell) -> list[Check]:
+    def drive(self, robot: LabRobot, tell: Tell) -> list[Check]:
         """Let a robot creep and turn, and check what came of it. It is told to stand however this ends."""
         try:
             ahead = tell(robot, CREEP, CREEP_S)

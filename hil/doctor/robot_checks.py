@@ -7,10 +7,11 @@ from itertools import pairwise
 from statistics import median
 
 from hil.doctor.check import Check, check
-from hil.doctor.evidence import Asked, Evidence, Robot, Rolled
+from hil.doctor.evidence import Asked, Evidence, Rolled
 from hil.nodes.findings import advice_on
 from hil.nodes.listeners import listener_findings
 from hil.wire.key_layout import KeyLayout
+from hil.wire.lab_robots import LabRobot
 from hil.wire.ros_tokens import Endpoint
 
 _LEAST_HZ = 10.0
@@ -29,7 +30,7 @@ def robot_checks(found: Evidence, graph: Sequence[Endpoint], layout: KeyLayout) 
         yield _one_sender(found, robot, graph, layout)
 
 
-def _odometry(found: Evidence, robot: Robot, rolled: Sequence[Rolled]) -> Check:
+def _odometry(found: Evidence, robot: LabRobot, rolled: Sequence[Rolled]) -> Check:
     unread = found.unread.get(robot.odom, 0)
     span_s = (rolled[-1].at_ns - rolled[0].at_ns) * 1e-9 if rolled else 0.0
     rate = (len(rolled) - 1) / span_s if span_s > 0.0 else 0.0
@@ -45,7 +46,7 @@ def _odometry(found: Evidence, robot: Robot, rolled: Sequence[Rolled]) -> Check:
     )
 
 
-def _odometry_clock(robot: Robot, rolled: Sequence[Rolled]) -> Check:
+def _odometry_clock(robot: LabRobot, rolled: Sequence[Rolled]) -> Check:
     age_s = median((each.at_ns - each.stamp_ns) * 1e-9 for each in rolled)
     stands = len({each.stamp_ns for each in rolled}) == 1 and len(rolled) > 1
     seen = f"{robot.name}: odometry is {age_s:.3f} s old when it comes"
@@ -57,7 +58,7 @@ def _odometry_clock(robot: Robot, rolled: Sequence[Rolled]) -> Check:
 
 
 def _listener(
-    robot: Robot, graph: Sequence[Endpoint], layout: KeyLayout, *, may_be_deaf: bool
+    robot: LabRobot, graph: Sequence[Endpoint], layout: KeyLayout, *, may_be_deaf: bool
 ) -> Iterator[Check]:
     """Whether the robot hears its commands, where it shows in the graph at all.
 
@@ -77,7 +78,7 @@ def _listener(
         yield Check("listens", True, f"{robot.name} listens to its commands", typename)
 
 
-def _one_sender(found: Evidence, robot: Robot, graph: Sequence[Endpoint], layout: KeyLayout) -> Check:
+def _one_sender(found: Evidence, robot: LabRobot, graph: Sequence[Endpoint], layout: KeyLayout) -> Check:
     """Whether at most one commands the robot: by the graph, or by stamps that run back and forth."""
     told = layout.within(layout.name(robot.cmd_vel))
     senders = {each.session for each in graph if each.publishes and each.key == told}

@@ -7,11 +7,11 @@ from collections.abc import Callable
 
 from formation.pose import STANDSTILL, Motion
 from hil.doctor.drive_checks import CREEP, CREEP_S, REST_S, TURN, TURN_S, Span
-from hil.doctor.evidence import Robot
 from hil.doctor.examination import Examination
 from hil.errors import AbreastError
 from hil.scenario.schema import Scenario
 from hil.wire.drive_message import drive_message
+from hil.wire.lab_robots import LabRobot
 from hil.wire.message_types import String
 from hil.wire.messages import MalformedPayloadError, decode_as, encode
 from hil.wire.pubsub import Wire
@@ -47,7 +47,7 @@ class Visit:
                 ticked = time.monotonic() + _TICK_S
                 self.examination.tick(time.time_ns())
 
-    def count_down(self, robot: Robot, say: Callable[[str], None], seconds: int = 3) -> None:
+    def count_down(self, robot: LabRobot, say: Callable[[str], None], seconds: int = 3) -> None:
         """Say what is about to happen, and let it be stopped."""
         way, turn = CREEP.v * CREEP_S, TURN.u * TURN_S
         say(f"{robot.name} will creep {way:.2f} m ahead and turn {turn:.1f} rad to the left")
@@ -55,7 +55,7 @@ class Visit:
             say(f"in {left} (Ctrl-C or abreast stop ends it)")
             self.listen(1.0)
 
-    def tell(self, robot: Robot, motion: Motion, seconds: float) -> Span:
+    def tell(self, robot: LabRobot, motion: Motion, seconds: float) -> Span:
         """Tell a robot to move for a while; the span of time of it, from when it had time to get going.
 
         Raises :class:`StoppedError` where it is to move and somebody says stop meanwhile.

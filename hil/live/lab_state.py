@@ -7,15 +7,15 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+from formation.pose import STANDSTILL, Motion
 from hil.nodes.findings import PREFIX, findings_in, findings_json
-from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.events import Event
+from hil.wire.lab_robots import robots_of
 from hil.wire.messages import MalformedPayloadError, decode_as
-from hil.wire.source_topics import all_bodies, source_topics
-from hil.wire.topics import link_topics
+from hil.wire.source_topics import source_topics
 
 _RATE_OVER_S = 2.0
 _QUIET_S = 0.25
@@ -44,31 +44,15 @@ class Heard:
         return (len(late) - 1) / (late[-1] - late[0]) if len(late) > 1 and late[-1] > late[0] else 0.0
 
 
-@dataclass(slots=True)
-class Drive:
-    """What a robot was last told to drive: v [m/s], u [rad/s]."""
-
-    v: float
-    u: float
-
-    @property
-    def still(self) -> bool:
-        """Whether it is told to stand."""
-        return self.v == 0.0 and self.u == 0.0
-
-
 class LabState:
     """The newest of everything that is heard, by the topics of a scenario."""
 
     def __init__(self, scenario: Scenario) -> None:
-        pairs = [link_topics(link) for link in links_of(scenario)]
-        self._stamped = pairs[0].stamped
-        names = (scenario.leader.name, *(link.follower for link in links_of(scenario)))
-        drives = (pairs[0].leader_cmd_vel, *(pair.cmd_vel for pair in pairs))
-        wheels = (pairs[0].leader_odom, *(pair.odom for pair in pairs))
-        self.robots = dict(zip(drives, names, strict=True))
-        self._wheels = dict(zip(names, wheels, strict=True))
-        self.wanted = all_bodies(scenario)
+        robots = robots_of(scenario)
+        self._stamped = scenario.controller.command_type == "TwistStamped"
+        self.robots = {each.cmd_vel: each.name for each in robots}
+        self._wheels = {each.name: each.odom for each in robots}
+        self.wanted = tuple(each.body for each in robots)
         self.topics = (
             topics.DIAGNOSTICS,
             topics.STOP,
@@ -80,7 +64,7 @@ class LabState:
         self._heard: dict[str, Heard] = {}
         self._bodies: dict[str, Heard] = {}
         self._daemons: dict[str, tuple[Heard, msg.DiagnosticStatus]] = {}
-        self.drives: dict[str, Drive] = {}
+        self.drives: dict[str, Motion] = {}
         self._driven_at: dict[str, float] = {}
         self.stops: list[str] = []
         self.malformed = 0
@@ -101,15 +85,15 @@ class LabState:
                 self.stops = [*self.stops[-9:], decode_as(event.payload, msg.String).data]
             elif event.topic in self.robots:
                 drive = self.drives[event.topic] = self._drive(event.payload)
-                if not drive.still:
+                if drive != STANDSTILL:
                     self._driven_at[event.topic] = now
         except MalformedPayloadError:
             self.malformed += 1
 
-    def _drive(self, payload: bytes) -> Drive:
+    def _drive(self, payload: bytes) -> Motion:
         stamped = decode_as(payload, msg.TwistStamped).twist if self._stamped else None
         twist = stamped or decode_as(payload, msg.Twist)
-        return Drive(twist.linear.x, twist.angular.z)
+        return Motion(twist.linear.x, twist.angular.z)
 
     def driven(self, now: float) -> list[str]:
         """Robots that were told nothing, or of late to drive: several may tell them in turn."""

@@ -44,7 +44,7 @@ class PoseSample:
     log_ns: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class InputSample:
     """A message for the estimator as it is to get it, but for its stamp; ``source``: the log's topic."""
 

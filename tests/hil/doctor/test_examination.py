@@ -13,7 +13,6 @@ import pytest
 from formation.pose import Motion
 from hil.doctor.check import Check
 from hil.doctor.drive_checks import REST_S, Span
-from hil.doctor.evidence import Robot
 from hil.doctor.examination import Examination
 from hil.emulator.node import EmulatorNode
 from hil.errors import UsageError
@@ -22,6 +21,7 @@ from hil.wire import message_types as msg
 from hil.wire.drive_message import drive_message
 from hil.wire.events import TICK, Event
 from hil.wire.key_layout import layout_of
+from hil.wire.lab_robots import LabRobot
 from hil.wire.messages import decode_as, encode, typename_of
 from hil.wire.ros_tokens import Endpoint
 from hil.wire.topics import RIGID_BODIES
@@ -70,7 +70,7 @@ class Lab:
                 self.examination.hear(self.waiting.pop(0)[2], self.now_ns)
             self.examination.tick(self.now_ns)
 
-    def tell(self, robot: Robot, motion: Motion, seconds: float) -> Span:
+    def tell(self, robot: LabRobot, motion: Motion, seconds: float) -> Span:
         begun_ns = self.now_ns
         for _ in range(round(seconds / 0.02)):
             told = drive_message(motion, self.now_ns, robot.name, stamped=True)
@@ -236,7 +236,7 @@ def backwards(event: Event, _: int) -> Sequence[tuple[Event, int]]:
 def test_a_robot_never_goes_beyond_what_was_promised() -> None:
     asked: list[Motion] = []
 
-    def tell(_: Robot, motion: Motion, __: float) -> Span:
+    def tell(_: LabRobot, motion: Motion, __: float) -> Span:
         asked.append(motion)
         return 0, 1
 
@@ -249,7 +249,7 @@ def test_a_robot_never_goes_beyond_what_was_promised() -> None:
 def test_a_robot_that_stops_answering_in_the_middle_is_told_to_stand() -> None:
     asked: list[Motion] = []
 
-    def tell(_: Robot, motion: Motion, __: float) -> Span:
+    def tell(_: LabRobot, motion: Motion, __: float) -> Span:
         asked.append(motion)
         if len(asked) == 1:
             raise KeyboardInterrupt
