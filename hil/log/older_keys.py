@@ -11,6 +11,17 @@ from copy import deepcopy
 from typing import Any
 
 BEFORE: dict[str, Any] = {
+    "source.type": "RigidBodies",
+    "source.topic": "",
+    "source.stamp": "header",
+    "source.up": "z",
+    "source.scale": 1.0,
+    "source.pair_within_s": 0.002,
+    "source.emulated": "",
+    "wire.layout": "ros2dds",
+    "wire.prefix": "",
+    "wire.domain": 0,
+    "wire.distro": "jazzy",
     "estimator.slip_v2": 0.0,
     "estimator.slip_u2": 0.0,
     "estimator.settled_heading": 0.0,
