@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import sys
 import time
-from contextlib import nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -24,6 +24,9 @@ from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario, refuse_unrunnable
 from hil.scenario.links import chain_of, links_of, refuse_chain
 from hil.scenario.schema import Scenario
+
+if TYPE_CHECKING:
+    from hil.wire.session import Endpoints
 
 
 @click.command("run")
@@ -58,6 +61,7 @@ from hil.scenario.schema import Scenario
     metavar="ENDPOINT",
     help=f"Where the router listens [a free port on loopback; with --real {DEFAULT_ENDPOINT}].",
 )
+@click.option("--connect", metavar="ENDPOINT", help="A router that is there, such as a bridge that listens.")
 @click.option(
     "--zenoh-config",
     type=click.Path(path_type=Path, dir_okay=False, exists=True),
@@ -107,10 +111,9 @@ def command(
 
 @dataclass(frozen=True, slots=True)
 class _Live:
-    """How to run live: where the router listens or what config leads to one, and who takes part."""
+    """How to run live: where all meet, None for a free port, and who takes part."""
 
-    listen: str | None
-    zenoh_config: Path | None
+    endpoints: Endpoints | None
     crew: Crew
 
 
@@ -122,6 +125,7 @@ def _how(
     driven_by: str | None,
     countdown: float | None,
     listen: str | None,
+    connect: str | None,
     zenoh_config: Path | None,
 ) -> _Live | None:
     """How to run live, None for in lockstep.
@@ -140,13 +144,19 @@ def _how(
         raise UsageError(f"{leads}: is for a leader that exists; leave it out, or --emulate leader")
     if driven_by == "hand" and countdown is not None:
         raise UsageError("--countdown: who drives the leader by hand counts himself; leave it out")
-    if listen is not None and zenoh_config is not None:
-        raise UsageError("--listen: --zenoh-config leads to a router that is there; leave one out")
+    if sum(each is not None for each in (listen, connect, zenoh_config)) > 1:
+        raise UsageError(
+            "--listen, --connect, --zenoh-config: each says where the router is; leave all but one out"
+        )
     if lockstep:
         return None
     by_hand = driven_by == "hand"
     crew = Crew(apart=apart, real=real, emulate=emulate or "", by_hand=by_hand, countdown_s=countdown)
-    return _Live(listen or (DEFAULT_ENDPOINT if real else None), zenoh_config, crew)
+    from hil.wire.session import Endpoints
+
+    if listen or connect or zenoh_config:
+        return _Live(Endpoints(connect, listen, zenoh_config), crew)
+    return _Live(Endpoints(listen=DEFAULT_ENDPOINT) if real else None, crew)
 
 
 def _run(chosen: Scenario, folder: Path, live: _Live | None, *, as_json: bool) -> None:
@@ -198,19 +208,19 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> str:
 
     from hil.live.daemon import Ending
     from hil.live.finding_lines import FindingLines, WaitingLines
-    from hil.live.run import Meeting, run_live
+    from hil.live.run import run_live
     from hil.live.run_monitor import Snapshot
-    from hil.wire.session import reserved_endpoint
+    from hil.wire.session import Endpoints, reserved_endpoint
 
     ending = Ending()
     ending.on_signals()
     console = Console(file=sys.stderr)
     starting = console.status(f"starting {', '.join(live.crew.daemons)}")
-    known = nullcontext(live.listen) if live.listen or live.zenoh_config else reserved_endpoint()
-    with known as endpoint, starting as status:
+    with ExitStack() as held:
+        endpoints = live.endpoints or Endpoints(listen=held.enter_context(reserved_endpoint()))
+        status = held.enter_context(starting)
         if live.crew.real:
-            where = live.zenoh_config or endpoint
-            console.print(Text(f"robots and bridges connect to {where}"), soft_wrap=True)
+            console.print(Text(f"robots and bridges connect to {endpoints.describe()}"), soft_wrap=True)
         lines = FindingLines(lambda line: console.print(Text(line), soft_wrap=True))
         # Who does not watch a terminal is told as well, once for whatever is waited for.
         aside = Console(file=sys.stderr, quiet=console.is_terminal)
@@ -226,9 +236,8 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> str:
                 status.update(Text(waits))
                 waiting.hear(waits)
 
-        meeting = Meeting(endpoint, live.zenoh_config)
         try:
-            outcome = run_live(scenario, log_path, meeting, ending, show, live.crew)
+            outcome = run_live(scenario, log_path, endpoints, ending, show, live.crew)
         finally:
             ending.leave_signals()
     if outcome.interrupted:

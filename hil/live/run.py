@@ -25,7 +25,7 @@ from hil.wire import topics
 from hil.wire.key_layout import layout_of
 from hil.wire.messages import encode
 from hil.wire.pubsub import Wire
-from hil.wire.session import Endpoints, close_session, open_session, reachable
+from hil.wire.session import Endpoints, close_session, open_session
 from hil.wire.topics import link_topics, urgent_topics
 
 START_TIMEOUT = 120.0
@@ -47,34 +47,13 @@ class Outcome:
     duration_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class Meeting:
-    """Where all meet: the endpoint at which we are the router, or a Zenoh config file that everybody uses."""
-
-    listen: str | None
-    config_file: Path | None = None
-
-    @property
-    def ours(self) -> Endpoints:
-        """How a session of the run gets there."""
-        if self.config_file is not None:
-            return Endpoints(config_file=self.config_file)
-        return Endpoints(connect=reachable(str(self.listen)))
-
-    @property
-    def options(self) -> list[str]:
-        """The same for a daemon's command line."""
-        if self.config_file is not None:
-            return ["--zenoh-config", str(self.config_file)]
-        return ["--connect", str(self.ours.connect)]
-
-
 def run_live(
-    scenario: Scenario, log_path: Path, meeting: Meeting, ending: Ending, show: Show, crew: Crew
+    scenario: Scenario, log_path: Path, endpoints: Endpoints, ending: Ending, show: Show, crew: Crew
 ) -> Outcome:
     """Run a scenario live for its duration, or until the end is asked for, or until a daemon fails.
 
-    Others may connect to the router too; real robots do. The scenario as it is run is put beside the log.
+    With ``endpoints`` that listen we are the router, else it is there. Others may connect to it too; real
+    robots do. The scenario as it is run is put beside the log.
     ``show`` gets the snapshot of the run and the time since the leader set off (None before), some 20 times a
     second. However it ends, the robots are stopped, the log is finished and no process is left.
     """
@@ -86,8 +65,8 @@ def run_live(
         raise UsageError(
             f"--out {folder}: cannot be written ({error.strerror}); give another folder"
         ) from None
-    router = None if meeting.config_file else open_session(Endpoints(listen=meeting.listen))
-    supervisor = _Supervisor(scenario, resolved, log_path, meeting, crew)
+    router = open_session(endpoints) if endpoints.listen else None
+    supervisor = _Supervisor(scenario, resolved, log_path, endpoints.joining, crew)
     try:
         return supervisor.run(ending, show)
     finally:
@@ -98,13 +77,13 @@ def run_live(
 
 class _Supervisor:
     def __init__(
-        self, scenario: Scenario, resolved: Path, log_path: Path, meeting: Meeting, crew: Crew
+        self, scenario: Scenario, resolved: Path, log_path: Path, joining: Endpoints, crew: Crew
     ) -> None:
         self._scenario, self._crew = scenario, crew
         self._links = links_of(scenario)
         pairs = [link_topics(link) for link in self._links]
         self._nodes = [name for daemon in crew.daemons for name in node_names(daemon, self._links)]
-        self._session = open_session(meeting.ours)
+        self._session = open_session(joining)
         self._wire = Wire(self._session, urgent_topics(scenario), layout_of(scenario), "run")
         wheels = [pair.odom for pair in pairs] if crew.real else []
         if crew.drives_leader:
@@ -113,7 +92,7 @@ class _Supervisor:
         self._children = Children(log_path.parent)
         self._drivers: list[str] = []
         for name, daemon, followers in processes_of(self._links, crew.daemons):
-            arguments = [str(resolved), *meeting.options, *crew.options(daemon, log_path)]
+            arguments = [str(resolved), *joining.options, *crew.options(daemon, log_path)]
             for follower in followers:
                 arguments += ["--follower", follower]
             self._children.start(name, daemon, arguments)

@@ -45,6 +45,17 @@ class Endpoints:
                     f"endpoint {endpoint!r}: expected protocol/address, such as tcp/127.0.0.1:7447"
                 )
 
+    @property
+    def joining(self) -> Endpoints:
+        """How others on this machine join whoever has these endpoints."""
+        return Endpoints(connect=reachable(self.listen)) if self.listen else self
+
+    @property
+    def options(self) -> list[str]:
+        """The same for a daemon's command line."""
+        given = {"--connect": self.connect, "--listen": self.listen, "--zenoh-config": self.config_file}
+        return [word for option, value in given.items() if value is not None for word in (option, str(value))]
+
     def describe(self) -> str:
         """The endpoints in words."""
         return str(self.config_file or self.listen or self.connect)
