@@ -8,7 +8,7 @@ from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.events import Event
 from hil.wire.messages import MalformedPayloadError, decode_as, header
-from hil.wire.pose_sources import laid, message_of, places_of
+from hil.wire.pose_sources import OF_ONE, laid, message_of, places_of
 from hil.wire.source_topics import source_topics
 
 _NEVER_NS = 2**62
@@ -47,8 +47,8 @@ class ForeignMocapNode:
         told = []
         for topic, where in self._topics.items():
             its = [(body, place) for body, place in bodies if where.body in ("", body)]
-            if its or not where.body:
-                told.append(outgoing(topic, message_of(given.type, head, its), stamp_ns))
+            messages = [[each] for each in its] if given.type in OF_ONE else [its]
+            told += [outgoing(topic, message_of(given.type, head, each), stamp_ns) for each in messages]
         return None, tuple(told)
 
     def report(self, state: None, now_ns: int) -> Outgoing:

@@ -117,8 +117,8 @@ def pose_of(place: Placement) -> msg.Pose:
 def message_of(kind: SourceType, head: msg.Header, seen: Iterable[tuple[str, Placement]]) -> msg.Message:
     """A message of a type of source, of one body where it holds one."""
     bodies = list(seen)
-    if kind in _OF_ONE:
-        return _OF_ONE[kind](head, *bodies[0])
+    if kind in OF_ONE:
+        return OF_ONE[kind](head, *bodies[0])
     if kind == "NamedPoseArray":
         return msg.NamedPoseArray(head, [msg.NamedPose(name, pose_of(place)) for name, place in bodies])
     if kind == "TFMessage":
@@ -166,9 +166,10 @@ def _as_transform(head: msg.Header, body: str, place: Placement) -> TransformSta
     )
 
 
-_OF_ONE: dict[SourceType, Callable[[msg.Header, str, Placement], msg.Message]] = {
+OF_ONE: dict[SourceType, Callable[[msg.Header, str, Placement], msg.Message]] = {
     "PoseStamped": _as_stamped,
     "PoseWithCovarianceStamped": _as_covariant,
     "Odometry": _as_odometry,
     "TransformStamped": _as_transform,
 }
+"""Types whose messages hold one body each, and how they are made."""

@@ -12,7 +12,7 @@ from hil.errors import UsageError
 from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
 from hil.wire.messages import typename_of
-from hil.wire.pose_sources import MESSAGES
+from hil.wire.pose_sources import MESSAGES, OF_ONE
 from hil.wire.topics import RIGID_BODIES
 
 BODY = "{body}"
@@ -28,7 +28,6 @@ _USUAL = {
     "TransformStamped": "vicon/{body}/{body}",
     "TFMessage": "tf",
 }
-_OF_ALL = ("RigidBodies", "NamedPoseArray", "TFMessage")
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,13 +71,13 @@ def source_topics(scenario: Scenario) -> dict[str, SourceTopic]:
     name = (given.topic or _USUAL[given.type]).strip("/")
     typename = typename_of(MESSAGES[given.type])
     if BODY not in name:
-        if given.type not in _OF_ALL and given.type != "TransformStamped":
+        if given.type in OF_ONE and given.type != "TransformStamped":
             raise UsageError(
                 f"scenario {scenario.name}: source.topic {given.topic!r} is one for all bodies, and a "
                 f"{given.type} does not say whose it is; expected {BODY} in the place of the body's name"
             )
         return {f"source/{name}": SourceTopic(name, typename)}
-    if given.type in _OF_ALL:
+    if given.type not in OF_ONE:
         raise UsageError(
             f"scenario {scenario.name}: source.topic {given.topic!r} has {BODY}, and a {given.type} holds "
             "all bodies; expected one topic's name"

@@ -64,6 +64,16 @@ def test_a_frame_comes_through_any_source_as_it_was(kind: SourceType, up: str, s
     assert (state.refused, state.taken["frame"]) == ({}, 1)
 
 
+def test_transforms_of_several_bodies_may_share_a_topic() -> None:
+    shared = ["source.type=TransformStamped", "source.topic=vicon"]
+    scenario = load_scenario("turtlebot3", [*NAMED, *shared])
+    lab, node = ForeignMocapNode(scenario), SourceNode(scenario)
+    _, told = lab.step(None, Event(RIGID_BODIES, encode(frame_message(NS, 7, PAIR))), NS + MS)
+    assert [each.topic for each in told] == ["source/vicon"] * 2
+    events = [(Event(each.topic, each.payload), NS) for each in told]
+    assert [names for _, names in seen(fed(node, node.begin(NS), events))] == [["1", "2"]]
+
+
 SCENARIO = load_scenario("turtlebot3", [*NAMED, "source.type=PoseStamped"])
 
 
