@@ -73,19 +73,25 @@ def travelled_motion(
 
     Who is faster than ``slowest`` [m/s] shows where it travels. Where that and the heading of the body, which
     may be NaN, keep one angle, heading and turn rate are the body's, by that angle; elsewhere they are the
-    travel's, and held while it stands. Unknown of one that never travels.
+    travel's, and held while it stands. Unknown of one that never travels. Backwards is who goes so on the
+    mean of the window, too: before a start the cubic swings back by a tenth of the speed to come.
     """
     start_ns = int(stamps_ns[0])
     times, wanted = _seconds(stamps_ns, start_ns), _seconds(moments_ns, start_ns)
     has_heading = bool(np.all(np.isfinite(poses[:, 2])))
     told = poses if has_heading else np.column_stack([poses[:, :2], np.zeros(len(poses))])
     grid, place, rate = _fitted(times, told, LOCAL_FIT)
-    speed = np.hypot(rate[:, 0], rate[:, 1])
-    if not np.any(speed > slowest):
+    mean = _mean_velocity(times, told, LOCAL_FIT)
+    along = np.sum(mean * rate[:, :2], axis=1)
+    moving = (np.hypot(*rate[:, :2].T) > slowest) & (np.hypot(*mean.T) > slowest) & (along > 0.0)
+    if not np.any(moving):
         unknown = np.full((len(wanted), 5), np.nan)
         return SmoothedMotion(unknown[:, :3], unknown[:, 3:])
-    heading, turn = _travelled_heading(place, rate, speed > slowest, has_heading=has_heading)
-    forward = rate[:, 0] * np.cos(heading) + rate[:, 1] * np.sin(heading)
+    heading, turn = _travelled_heading(place, rate, moving, has_heading=has_heading)
+    forward, backwards = (
+        each[:, 0] * np.cos(heading) + each[:, 1] * np.sin(heading) for each in (rate, -mean)
+    )
+    forward[(forward < 0.0) & (backwards < slowest)] = 0.0
     fitted = np.column_stack([place[:, :2], heading, forward, turn])
     rows = np.column_stack([np.interp(wanted, grid, column) for column in fitted.T])
     rows[_unknown(times, wanted, LOCAL_FIT)] = np.nan
@@ -129,10 +135,23 @@ def _fitted(times: FloatArray, poses: FloatArray, fit: LocalFit) -> tuple[FloatA
         return np.empty(0), np.empty((0, 3)), np.empty((0, 3))
     free = poses.copy()
     free[:, 2] = np.unwrap(poses[:, 2])
-    even = np.column_stack([np.interp(grid, times, column) for column in free.T])
+    even = _even(grid, times, free)
     place = savgol_filter(even, length, DEGREE, axis=0)
     rate = savgol_filter(even, length, DEGREE, deriv=1, delta=fit.step, axis=0)
     return grid, place, rate
+
+
+def _mean_velocity(times: FloatArray, poses: FloatArray, fit: LocalFit) -> FloatArray:
+    """Slopes (m, 2) of straight lines through the windows on the grid: no velocity counts negative there."""
+    grid = np.arange(0.0, times[-1] if len(times) else 0.0, fit.step)
+    length = 2 * round(0.5 * fit.window / fit.step) + 1
+    if len(grid) < length:
+        return np.empty((0, 2))
+    return savgol_filter(_even(grid, times, poses[:, :2]), length, 1, deriv=1, delta=fit.step, axis=0)
+
+
+def _even(grid: FloatArray, times: FloatArray, columns: FloatArray) -> FloatArray:
+    return np.column_stack([np.interp(grid, times, column) for column in columns.T])
 
 
 def poses_at(stamps_ns: NDArray[np.int64], poses: FloatArray, moments_ns: NDArray[np.int64]) -> FloatArray:

@@ -15,7 +15,8 @@ from formation.angles import FloatArray
 from hil.judge.bounds import WorstErrors, bound_errors, named_bounds, worst_errors
 from hil.judge.certified import CertifiedColumns
 from hil.judge.columns import Columns, EstimateColumns, columns_of
-from hil.judge.noise_free_orbit import NoiseFreeOrbit, noise_free_orbit
+from hil.judge.formation import orbit_of_run
+from hil.judge.noise_free_orbit import NoiseFreeOrbit
 from hil.judge.run_data import RunData
 from hil.judge.side_orders import desired_bearings
 from hil.judge.true_states import Stamps, TrueStates
@@ -47,9 +48,7 @@ class PlotData:
     def of(run_data: RunData) -> PlotData:
         """Gather what is drawn of a run's data."""
         columns = columns_of(run_data)
-        driven = run_data.motion_since_ns is not None
-        scenario, orders = run_data.scenario, run_data.orders
-        orbit = noise_free_orbit(scenario, columns.truth, columns.run, orders) if driven else None
+        orbit = orbit_of_run(run_data, columns)
         during = columns.estimates.capture_ns <= columns.run.to_ns
         tracked = columns.estimates.only((columns.estimates.status == Status.TRACKING) & during)
         worst: WorstErrors | None = None

@@ -61,12 +61,17 @@ def smoothed_truth(tracks: MocapTracks, scenario: Scenario) -> TrueStates:
 
     The leader's heading is that of its travel.
     """
-    at_ns, slowest = tracks.capture_ns, 0.5 * scenario.leader.v_eps
+    at_ns, slowest = tracks.capture_ns, slowest_travel(scenario)
     leads = travelled_motion(at_ns, _robots(tracks.leader, leader_mount(scenario)), at_ns, slowest)
     follows = smoothed_motion(at_ns, _robots(tracks.follower, follower_mount(scenario)), at_ns)
     return TrueStates.along(
         at_ns, np.column_stack([leads.poses, follows.poses, leads.motion, follows.motion])
     )
+
+
+def slowest_travel(scenario: Scenario) -> float:
+    """Speed [m/s] above which a leader is seen to travel."""
+    return 0.5 * scenario.leader.v_eps
 
 
 def _robots(bodies: FloatArray, mount: Mount) -> FloatArray:

@@ -24,6 +24,8 @@ _TICK_NS = 100_000_000
 _DIAGNOSTICS_NS = 500_000_000
 _MOST_STRANGERS = 20
 _GONE_NS = 1_000_000_000
+_IN_PARTS = ("TransformStamped", "TFMessage")
+"""Types of which several messages on one topic may tell of one moment."""
 
 
 class Gathering(NamedTuple):
@@ -125,7 +127,7 @@ class SourceNode:
             state.seen_ns[each.body] = now_ns
             stamp_ns = now_ns if self._given.stamp == "receive" else each.stamp_ns or now_ns
             yield from self._gathered(state, each._replace(stamp_ns=stamp_ns))
-        if known and not topic.body and state.gathering is not None and self._given.type != "TFMessage":
+        if known and not topic.body and state.gathering is not None and self._given.type not in _IN_PARTS:
             yield from self._frame(state)
 
     def _gathered(self, state: SourceState, place: NamedPlace) -> Iterable[Outgoing]:

@@ -100,3 +100,26 @@ def test_who_stands_looks_where_it_will_travel() -> None:
     np.testing.assert_allclose(found.motion[20:90, 0], 0.0, atol=1e-6)
     standing = travelled_motion(stamps, np.zeros((300, 3)), stamps, 0.02)
     assert np.isnan(standing.poses).all()
+
+
+@given(st.floats(0.03, 0.3), st.sampled_from([0.0, np.nan]), st.integers(0, 9))
+def test_who_sets_off_was_not_seen_to_drive_back_before(v: float, shown: float, seed: int) -> None:
+    stamps, generator = np.arange(300) * STEP_NS, np.random.default_rng(seed)
+    way = v * np.maximum(0.0, stamps * 1e-9 - 2.0)
+    poses = np.column_stack([way, np.zeros(300), np.full(300, shown)])
+    poses[:, :2] += generator.normal(size=(300, 2)) * 3e-4
+    found = travelled_motion(stamps, poses, stamps, 0.01)
+    inner = slice(20, -20)
+    assert (found.motion[inner, 0] >= 0.0).all()
+    assert (np.abs(found.poses[inner, 2]) < 0.3).all()
+    np.testing.assert_allclose(found.motion[-120:-20, 0], v, atol=6e-3)
+
+
+def test_who_drives_back_is_seen_to() -> None:
+    stamps = np.arange(400) * STEP_NS
+    way = 0.1 * np.abs(stamps * 1e-9 - 3.0)
+    found = travelled_motion(stamps, np.column_stack([way, np.zeros(400), np.zeros(400)]), stamps, 0.01)
+    np.testing.assert_allclose(np.abs(found.motion[20:160, 0]), 0.1, atol=1e-3)
+    np.testing.assert_allclose(np.abs(found.motion[220:-20, 0]), 0.1, atol=1e-3)
+    turn = found.motion[20:160, 0] * np.cos(found.poses[20:160, 2])
+    np.testing.assert_allclose(turn, -0.1, atol=1e-3)

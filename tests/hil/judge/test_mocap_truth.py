@@ -82,6 +82,17 @@ def test_figures_are_those_of_the_truth_to_what_a_track_can_tell(both: tuple[Run
     assert real["duration_s"] == pytest.approx(known["duration_s"], abs=0.05)
 
 
+@pytest.mark.parametrize("late_s", [0.1, 0.3, 1.0])
+def test_a_leader_that_sets_off_later_than_it_was_told_is_judged_the_same(
+    both: tuple[RunData, RunData], late_s: float
+) -> None:
+    real = both[1]
+    told = dataclasses.replace(real, motion_since_ns=(real.motion_since_ns or 0) - round(late_s * 1e9))
+    found, expected = (summarise(each)["formation"]["orbit_deviation_rms"] for each in (told, real))
+    assert found["rho"] == pytest.approx(expected["rho"], abs=0.0003)
+    assert found["alpha1"] == pytest.approx(expected["alpha1"], abs=0.01)
+
+
 def test_what_takes_the_truth_itself_is_not_made_up(both: tuple[RunData, RunData]) -> None:
     summary = summarise(both[1])
     assert not summary["estimation"].keys() & {"efficiency", "coverage_3sigma", "nees", "nees_limits"}
