@@ -22,16 +22,19 @@ def twist(v: float, u: float) -> msg.Twist:
 
 
 def drive(lab: Lab, wire: Wire, topic: str, seconds: float) -> dict[str, list[bytes]]:
-    """Tell the follower to drive, and take down what comes."""
+    """Tell the follower to drive, twenty times a second, and take down what comes."""
     heard: dict[str, list[bytes]] = {}
-    until = time.monotonic() + seconds
-    while time.monotonic() < until:
+    due = time.monotonic()
+    until = due + seconds
+    while due < until:
         asked: msg.Message = twist(0.1, 0.2)
         if lab.command_types[1] == "TwistStamped":
             asked = msg.TwistStamped(header=header(time.time_ns(), "follower"), twist=twist(0.1, 0.2))
         wire.publish(topic, encode(asked))
-        while (event := wire.inbox.take(0.02)) is not None:
-            heard.setdefault(event.topic, []).append(event.payload)
+        due += 0.05
+        while (left := due - time.monotonic()) > 0.0:
+            if (event := wire.inbox.take(left)) is not None:
+                heard.setdefault(event.topic, []).append(event.payload)
     return heard
 
 
