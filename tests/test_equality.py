@@ -6,8 +6,12 @@ hides that as long as both records hold the same array object, and not even then
 
 from __future__ import annotations
 
+import ast
+import functools
 import importlib
+import inspect
 import pkgutil
+import sys
 import typing
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
@@ -32,11 +36,27 @@ def records() -> Iterator[type]:
                     yield each
 
 
+@functools.cache
+def imported_for_types(module: str) -> dict[str, Any]:
+    """What a module imports for a type checker alone."""
+    found: dict[str, Any] = {}
+    source = inspect.getsource(sys.modules[module])
+    for block in ast.parse(source).body:
+        if isinstance(block, ast.If) and getattr(block.test, "id", "") == "TYPE_CHECKING":
+            for each in block.body:
+                if isinstance(each, ast.ImportFrom) and each.module:
+                    origin = vars(importlib.import_module(each.module))
+                    names = [name for name in each.names if name.name in origin]
+                    found |= {name.asname or name.name: origin[name.name] for name in names}
+    return found
+
+
 def held_types(record: type) -> list[Any]:
     """Types of a record's fields, for a dataclass or a named tuple."""
     names = [each.name for each in fields(record)] if is_dataclass(record) else record._fields  # type: ignore[attr-defined]
     # Classes that rosbags generates name both without importing them.
-    hints = typing.get_type_hints(record, localns={"ClassVar": ClassVar, "np": np})
+    known = {"ClassVar": ClassVar, "np": np} | imported_for_types(record.__module__)
+    hints = typing.get_type_hints(record, localns=known)
     return [hints[name] for name in names]
 
 

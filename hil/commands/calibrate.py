@@ -84,8 +84,8 @@ def _say_mounts(found: Mounts) -> None:
 
     if not found.known:
         return
-    click.echo(said("leader", found.leader), err=True)
-    click.echo(said("follower", found.follower), err=True)
+    click.echo(said("leader", found), err=True)
+    click.echo(said("follower", found), err=True)
     if None in (found.follower.x, found.follower.y, found.follower.yaw):
         click.echo(
             "what is not told takes half a minute with left and right turns; a follower that was stopped for "

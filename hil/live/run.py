@@ -29,7 +29,10 @@ from hil.wire.session import Endpoints, close_session, open_session
 from hil.wire.topics import link_topics, urgent_topics
 
 START_TIMEOUT = 120.0
-"""For the start barrier, from when a daemon was last heard for the first time [s]: it may have to compile."""
+"""For the start barrier [s], from when the last of all daemons was heard for the first time."""
+
+FIRST_WORD_TIMEOUT = 900.0
+"""For a daemon that was never heard [s]: on a busy machine its first start compiles for many minutes."""
 
 SILENCE = 3.0
 STANDSTILL_TIMEOUT = 10.0
@@ -112,9 +115,10 @@ class _Supervisor:
                 set_off = now - (time.time_ns() - snapshot.motion_since_ns) * 1e-9
             if len(snapshot.heard) > known:
                 begun, known = now, len(snapshot.heard)
-            if set_off is None and now - begun > START_TIMEOUT and not self._may_wait(snapshot):
+            patience = START_TIMEOUT if self._all_heard(snapshot) else FIRST_WORD_TIMEOUT
+            if set_off is None and now - begun > patience and not self._may_wait(snapshot):
                 failure = (
-                    f"the start barrier did not open within {START_TIMEOUT:g} s: "
+                    f"the start barrier did not open within {patience:g} s: "
                     f"{snapshot.waits_for(self._nodes) or 'no daemon says why'}"
                 )
             show(snapshot, None if set_off is None else now - set_off)
@@ -136,7 +140,10 @@ class _Supervisor:
 
     def _may_wait(self, snapshot: Snapshot) -> bool:
         """Whether what is waited for may take its time: people who set up robots do, daemons do not."""
-        return self._crew.real and snapshot.heard.keys() >= set(self._nodes)
+        return self._crew.real and self._all_heard(snapshot)
+
+    def _all_heard(self, snapshot: Snapshot) -> bool:
+        return snapshot.heard.keys() >= set(self._nodes)
 
     def _failure(self, timeout: float) -> str:
         """What has gone wrong, if anything, within ``timeout`` [s]."""

@@ -25,6 +25,7 @@ M = TypeVar("M", bound=msg.Message)
 _STILL_V = 0.01
 _STILL_U = 0.05
 _LONGEST_GLANCE = 0.25
+_COMPILES_S = 15.0
 """Between two looks [s]; more than this says that the machine stood still."""
 
 
@@ -70,7 +71,8 @@ class Snapshot:
         """
         unheard = [name for name in names if name not in self.heard]
         if unheard:
-            return f"nothing was heard of {', '.join(unheard)}"
+            patience = " yet; a first start compiles for minutes" if self.observed_s > _COMPILES_S else ""
+            return f"nothing was heard of {', '.join(unheard)}{patience}"
         return "; ".join(f"{name}: {problem}" for name, problem in self.problems.items() if problem)
 
     def silent(self, names: Iterable[str], patience: float) -> str | None:

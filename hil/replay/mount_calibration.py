@@ -45,11 +45,15 @@ _DIGITS = 5  # of a proposed mount: hundredths of a millimetre, thousandths of a
 
 @dataclass(frozen=True, slots=True)
 class Mounts:
-    """Mounts that a log shows, and those to go on with: what is not known stays as the scenario had it."""
+    """Mounts that a log shows, and those to go on with: what is not known stays as the scenario had it.
+
+    ``bare``: robots whose bodies have no orientation, by which alone a mount could be found.
+    """
 
     leader: FoundMount
     follower: FoundMount
     settings: dict[str, Mount]
+    bare: frozenset[str] = frozenset()
 
     @property
     def known(self) -> bool:
@@ -111,12 +115,14 @@ def mounts_of_events(
     begin_ns = -1 if from_s is None else zero_ns + round(from_s * 1e9)
     end_ns = 2**63 if to_s is None else zero_ns + round(to_s * 1e9)
     noise = pose_noise(scenario)
+    shown = {
+        robot: {at_ns: pose for at_ns, pose in poses.items() if begin_ns <= at_ns <= end_ns}
+        for robot, poses in (("leader", tracks.leader), ("follower", tracks.follower))
+    }
+    bare = frozenset(robot for robot, poses in shown.items() if _is_bare(poses))
     leader, follower = (
-        _found({at_ns: pose for at_ns, pose in poses.items() if begin_ns <= at_ns <= end_ns}, speeds, noise)
-        for poses, speeds in (
-            (tracks.leader, tracks.leader_speed),
-            (tracks.follower, tracks.follower_speed),
-        )
+        NOTHING_FOUND if robot in bare else _found(shown[robot], speeds, noise)
+        for robot, speeds in (("leader", tracks.leader_speed), ("follower", tracks.follower_speed))
     )
     given = {"leader": (leader, leader_mount(scenario)), "follower": (follower, follower_mount(scenario))}
     settings = {
@@ -124,7 +130,7 @@ def mounts_of_events(
         for robot, (found, before) in given.items()
         if found != NOTHING_FOUND
     }
-    return Mounts(leader, follower, settings)
+    return Mounts(leader, follower, settings, bare)
 
 
 def body_tracks(events: Iterable[Timed], scenario: Scenario) -> BodyTracks:
@@ -155,14 +161,17 @@ def body_tracks(events: Iterable[Timed], scenario: Scenario) -> BodyTracks:
     return tracks
 
 
+def _is_bare(poses: dict[int, Pose]) -> bool:
+    """Whether a body never turns by a hair: its source knows no orientation."""
+    return len(poses) > 1 and np.ptp([pose.theta for pose in poses.values()]) == 0.0
+
+
 def _found(poses: dict[int, Pose], speeds: dict[int, float], noise: PoseNoise) -> FoundMount:
-    """Mount by poses and what wheels tell of the speed; nothing of a body that has no orientation."""
+    """Mount by poses and what wheels tell of the speed."""
     if len(poses) < 2:
         return NOTHING_FOUND
     stamps = sorted(poses)
     track = np.array([poses[at_ns] for at_ns in stamps])
-    if np.ptp(track[:, 2]) == 0.0:
-        return NOTHING_FOUND
     zero_ns = stamps[0]
     told = sorted(speeds)
     wheels = WheelSpeed(_seconds(told, zero_ns), np.array([speeds[at_ns] for at_ns in told]))
@@ -178,9 +187,14 @@ def _seconds(stamps_ns: list[int], zero_ns: int) -> FloatArray:
     return np.array([(at_ns - zero_ns) * _NS for at_ns in stamps_ns])
 
 
-def said(robot: str, found: FoundMount) -> str:
+def said(robot: str, mounts: Mounts) -> str:
     """One line on what was found of a robot's mount, for people."""
-    parts = []
+    if robot in mounts.bare:
+        return (
+            f"body on the {robot}: has no orientation, by which its mount could be found; where it is not "
+            f"above the middle of the axle, measure by how much and set {robot}.mount"
+        )
+    found, parts = mounts.leader if robot == "leader" else mounts.follower, []
     for name, value, sd, unit, scale in (
         ("yaw", found.yaw, found.sd[2], "deg", 180.0 / math.pi),
         ("x", found.x, found.sd[0], "mm", 1e3),

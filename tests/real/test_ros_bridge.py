@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from hil.nodes.findings import findings_in
 from hil.wire import message_types as msg
 from hil.wire.messages import decode_as, encode, header
 from hil.wire.pubsub import Wire
-from tests.real.ros_lab import Lab, bridge, standing
+from tests.real.ros_lab import HERE, Lab, bridge, peer, standing
 from tests.routers import router
 
 pytestmark = pytest.mark.slow
@@ -88,12 +89,25 @@ def test_a_robot_that_does_not_listen_is_named(lab: Lab, finding: str, peers: Pa
 def test_a_stop_goes_both_ways_once(peers: Path) -> None:
     """An operator's stop in ROS reaches our daemons, and ours reaches ROS; neither goes in a circle."""
     lab = Lab(domain=95)
-    with router() as (endpoint, wire), bridge(lab, endpoint, peers) as ours:
-        wire.subscribe(["stop", "diagnostics"])
-        wire.publish("stop", encode(msg.String(data="by hand")))
-        stops, until = [], time.monotonic() + 3.0
-        while time.monotonic() < until:
-            if (event := wire.inbox.take(0.1)) is not None and event.topic == "stop":
-                stops.append(event.payload)
-        assert len(stops) == 1
-        assert ours.process.poll() is None
+    operator = [str(HERE / "rclpy_operator.py"), json.dumps({"domain": lab.domain})]
+    with (
+        router() as (endpoint, wire),
+        bridge(lab, endpoint, peers),
+        peer("operator", operator, peers) as theirs,
+    ):
+        theirs.wait_for("ready")
+        wire.subscribe(["stop"])
+        theirs.say("by them")
+        assert stops_within(wire, 3.0) == ["by them"]
+        wire.publish("stop", encode(msg.String(data="by us")))
+        assert stops_within(wire, 3.0) == ["by us"]
+        assert [line for line in theirs.finish() if "by" in line] == ["by them", "by us"]
+
+
+def stops_within(wire: Wire, seconds: float) -> list[str]:
+    """Reasons of the stops that come."""
+    stops, until = list[str](), time.monotonic() + seconds
+    while (left := until - time.monotonic()) > 0.0:
+        if (event := wire.inbox.take(left)) is not None and event.topic == "stop":
+            stops.append(decode_as(event.payload, msg.String).data)
+    return stops

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import pytest
@@ -20,18 +20,31 @@ from hil.wire.messages import decode_as
 from hil.wire.session import reserved_endpoint
 from tests.hil.live.child_run import PATIENCE, Run
 from tests.hil.live.own_poses import off_orbit
+from tests.routers import router
 
 pytestmark = pytest.mark.slow
 
 DURATION, FROM = 20.0, 12.0
 
 
+Met = tuple[str, list[str]]
+"""An endpoint at which all meet, and by which options of a run."""
+
+
 @contextmanager
-def real_run(folder: Path, lab_options: list[str], options: list[str]) -> Iterator[tuple[Run, Path]]:
+def router_of_the_run() -> Iterator[Met]:
+    with reserved_endpoint() as endpoint:
+        yield endpoint, ["--listen", endpoint]
+
+
+@contextmanager
+def real_run(
+    folder: Path, lab_options: list[str], options: list[str], there: Met | None = None
+) -> Iterator[tuple[Run, Path]]:
     """A run, and where the lab leaves the robots' own poses once the run is over."""
     table = folder / "poses.csv"
-    with reserved_endpoint() as endpoint:
-        where = ["--listen", endpoint, "--out", str(folder / "run"), "--json"]
+    with nullcontext(there) if there else router_of_the_run() as (endpoint, meeting):
+        where = [*meeting, "--out", str(folder / "run"), "--json"]
         given = ["--duration", str(DURATION), "--set", f"run.evaluate_from_s={FROM}"]
         process = subprocess.Popen(
             [sys.executable, "-m", "hil", "run", "turtlebot3", "--real", *where, *given, *options],
@@ -75,6 +88,20 @@ def test_the_pair_keeps_to_the_orbit_by_its_own_poses_and_by_the_judge(
     assert summary["formation"]["orbit_deviation_rms"]["rho"] < 0.003
     assert summary["estimation"]["rmse"]["v1"] < 0.003
     assert summary["duration_s"] == pytest.approx(DURATION, abs=0.5)
+
+
+@pytest.mark.parametrize("by", ["endpoint", "file"])
+def test_a_router_that_is_there_will_do(tmp_path: Path, by: str) -> None:
+    with router() as (endpoint, _):
+        config = {"mode": "client", "connect": {"endpoints": [endpoint]}}
+        (tmp_path / "lab.json5").write_text(json.dumps(config), encoding="utf-8")
+        told = (
+            ["--connect", endpoint] if by == "endpoint" else ["--zenoh-config", str(tmp_path / "lab.json5")]
+        )
+        with real_run(tmp_path, [], ["--countdown", "0.5"], (endpoint, told)) as (run, _):
+            code, summary, err = run.finish()
+    assert code == 0, err
+    assert summary["formation"]["orbit_deviation_rms"]["rho"] < 0.003
 
 
 @pytest.mark.parametrize("robot", ["leader", "follower"])

@@ -14,7 +14,7 @@ from hil.lockstep.run import run_lockstep
 from hil.log.reader import read_log
 from hil.log.writer import LogWriter
 from hil.replay.lab_calibration import calibration_of
-from hil.replay.mount_calibration import mounts_of_log
+from hil.replay.mount_calibration import mounts_of_log, said
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
@@ -109,6 +109,9 @@ def test_a_leader_without_orientation_has_no_mount_that_is_known(run_log: Path, 
     assert found.leader == NOTHING_FOUND
     assert found.follower.yaw == pytest.approx(FOLLOWER.yaw, abs=5e-3)
     assert set(found.settings) == {"follower.mount"}
+    assert "no orientation" in said("leader", found)
+    assert "measure by how much and set leader.mount" in said("leader", found)
+    assert said("follower", found).startswith("body on the follower: yaw +")
 
 
 def test_what_the_log_was_made_with_is_part_of_what_is_found(run_log: Path) -> None:
