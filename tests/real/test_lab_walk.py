@@ -26,7 +26,7 @@ from tests.real.ros_lab import HERE, ROOT, Lab, Peer, free_port, peer, ros_envir
 
 pytestmark = pytest.mark.slow
 
-PATIENCE, OFF_M, DRIVEN_S = 400.0, 0.003, 35.0
+PATIENCE, OFF_M, DRIVEN_S, LOOKED_S = 400.0, 0.003, 35.0, 6.0
 LEADER_MOUNT, FOLLOWER_MOUNT = (0.02, 0.0, 0.0), (0.012, 0.0, 0.05)
 """How the bodies sit on the robots, which nobody is told."""
 
@@ -52,8 +52,8 @@ class Steps:
         return ["-m", "hil", *shlex.split(line.replace("192.0.2.20", "127.0.0.1"))[1:]]
 
 
-def done(command: list[str]) -> subprocess.CompletedProcess[str]:
-    """A command that has ended, and well."""
+def done(command: list[str], code: int = 0) -> subprocess.CompletedProcess[str]:
+    """A command that has ended with this code."""
     ended = subprocess.run(
         [sys.executable, *command],
         capture_output=True,
@@ -62,7 +62,7 @@ def done(command: list[str]) -> subprocess.CompletedProcess[str]:
         env=ros_environment(),
         check=False,
     )
-    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert ended.returncode == code, ended.stdout + ended.stderr
     return ended
 
 
@@ -135,7 +135,9 @@ def test_the_path_leads_to_a_formation(peers: Path, tmp_path: Path, monkeypatch:
         wheels.wait_for("ready")
         with placed(lab, port, peers) as robots:
             done(path.take("doctor"))
-            assert "tb3_1" in done(path.take("doctor")).stdout
+            creep = path.take("doctor")
+            refused = re.findall(r"^ *no +(\w+)", done(creep, 1).stdout, re.MULTILINE)
+            assert set(refused) == {"frame_pivot"}
             told = {"domain": 30, "robots": lab.namespaces, "seconds": DRIVEN_S}
             recorder = path.take("recorder")
             with peer("hand", [str(HERE / "rclpy_teleop.py"), json.dumps(told)], peers):
@@ -145,6 +147,9 @@ def test_the_path_leads_to_a_formation(peers: Path, tmp_path: Path, monkeypatch:
         found = load_scenario(str(scenario))
         assert found.follower.mount == pytest.approx(FOLLOWER_MOUNT, abs=0.004)
         assert found.leader.mount == pytest.approx(LEADER_MOUNT, abs=0.004)
+        with placed(lab, port, peers) as robots:
+            done(creep)
+            robots.finish()
         drive = path.take("run")
         with placed(lab, port, peers) as robots:
             done(drive)
@@ -155,12 +160,14 @@ def test_the_path_leads_to_a_formation(peers: Path, tmp_path: Path, monkeypatch:
         summary = json.loads(Path("first/summary.json").read_text(encoding="utf-8"))
         assert summary["formation"]["orbit_deviation_rms"]["rho"] < OFF_M
         assert summary["findings"] == []
+        done(["-m", "hil", "replay", "first/run.mcap", "--verify"])
         with (
             placed(lab, port, peers) as robots,
             peer("run", [each if each != "first" else "second" for each in drive]) as run,
         ):
             wait_until_driven("tb3_1/cmd_vel", run)
             with peer("status", path.take("status")) as seen:
+                time.sleep(LOOKED_S)
                 seen.process.send_signal(signal.SIGINT)
                 assert any("controller" in line for line in seen.finish())
             done(path.take("stop"))
