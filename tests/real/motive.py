@@ -2,11 +2,11 @@
 
 ``python tests/real/motive.py CONFIG``, where CONFIG is JSON:
 
-    {"poses_at": 27470, "duration_s": 60, "bodies": ["leader", "follower"],
+    {"poses_at": 27470, "data_port": 27471, "duration_s": 60, "bodies": ["leader", "follower"],
      "mounts": [[0.02, 0, 0], [0.01, 0, 0.06]], "sigma_position": 0.0003, "sigma_heading": 0.0035}
 
 It hears the true poses of the robots by UDP, as tests/real/rclpy_robots.py sends them, and serves the bodies
-that sit on them so, Z up and in metres, at the ports and by the version of a Motive that nobody has changed.
+that sit on them so, Z up and in metres, at the command port of a Motive that nobody has changed.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def poses_in(data: bytes) -> Iterator[Pose]:
 def main() -> None:
     given = json.loads(sys.argv[1])
     begun_ns = time.time_ns()
-    info = ServerInfo("Motive", "3.1.0.0", VERSIONS[-1], FREQUENCY)
+    info = ServerInfo("Motive", "3.1.0.0", VERSIONS[-1], FREQUENCY, given["data_port"])
     service = NatNetService(info, given["bodies"], 120.0, lambda at_ns: at_ns - begun_ns)
     mounts = [Mount(*mount) for mount in given["mounts"]]
     position, heading = given["sigma_position"], given["sigma_heading"]

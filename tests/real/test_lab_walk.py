@@ -78,6 +78,7 @@ def placed(lab: Lab, poses_to: int, peers: Path) -> Iterator[Peer]:
 def motive(poses_at: int) -> Iterator[Peer]:
     given = {
         "poses_at": poses_at,
+        "data_port": free_port(),  # others here may listen at Motive's own
         "duration_s": 4.0 * PATIENCE,
         "bodies": ["leader", "follower"],
         "mounts": [LEADER_MOUNT, FOLLOWER_MOUNT],
