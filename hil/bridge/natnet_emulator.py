@@ -137,10 +137,11 @@ class NatNetEmulator(NodeWorker):
         while not self._closed.is_set():
             select.select([self._socket], [], [], _LONGEST_WAIT)
             for data, sender, at_ns in arrivals(self._socket):
+                # Sent before it is let go: a frame that overtook the model would be taken for it.
                 with self._lock:
                     answer = self._service.hear(data, sender, at_ns)
-                if answer is not None:
-                    send(self._socket, answer, sender)
+                    if answer is not None:
+                        send(self._socket, answer, sender)
 
 
 def run_alone(

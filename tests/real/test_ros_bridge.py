@@ -51,7 +51,7 @@ def test_frames_and_odometry_come_in_and_commands_go_out(lab: Lab, peers: Path) 
     leader, follower = (f"{name}/" if name else "" for name in lab.namespaces)
     with router() as (endpoint, wire), standing(lab, peers) as (robots, _), bridge(lab, endpoint, peers):
         wire.subscribe([lab.topic, f"{leader}odom", f"{follower}odom", "diagnostics"])
-        heard = drive(lab, wire, f"{follower}cmd_vel", 4.0)
+        heard = drive(lab, wire, f"{follower}cmd_vel", 6.0)
         robots.finish()
     frame = decode_as(heard[lab.topic][-1], msg.RigidBodies)
     assert tuple(body.rigid_body_name for body in frame.rigidbodies) == lab.bodies
