@@ -8,12 +8,16 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from typing import Protocol
 
+from formation.pose import STANDSTILL
 from hil.bridge.ros_routes import Route
 from hil.live.finding_lines import FindingLines
 from hil.nodes.findings import named_findings
 from hil.nodes.listeners import listener_findings
-from hil.nodes.node import Outgoing, diagnostics, is_due, outgoing
+from hil.nodes.node import Outgoing, diagnostics, is_due, named_counts, outgoing
 from hil.wire import topics
+from hil.wire.drive_message import drive_message
+from hil.wire.events import Event
+from hil.wire.messages import encode
 from hil.wire.pubsub import Wire
 
 NAME = "bridge/ros2"
@@ -21,6 +25,7 @@ _PERIOD_NS = 500_000_000
 _PATIENCE_NS = 1_500_000_000
 _PUMP_WAIT = 0.1
 _ECHO_S = 1.0
+_LINGER_S = 0.2
 
 
 class Graph(Protocol):
@@ -54,12 +59,14 @@ class RosBridge:
         say: Callable[[str], None],
     ) -> None:
         self._wire, self._routes = wire, routes
+        self._driven = [route for route in routes if route.drives]
         self._types = {route.topic: route.typename for route in routes}
         self._two_way = frozenset(route.topic for route in routes if route.way == "both")
         self._echoes: dict[bytes, float] = {}
         self._lock = threading.Lock()
         self._heard: list[tuple[str, bytes]] = []
         self._carried: Counter[str] = Counter()
+        self._refused: Counter[str] = Counter()
         self._begun_ns = self._report_ns = 0
         self._say, self._findings, self._waits = say, FindingLines(say), ""
         self._graph = make_graph(self._hear)
@@ -88,10 +95,22 @@ class RosBridge:
         yield self._report(now_ns)
 
     def close(self) -> None:
-        """Carry nothing any more, and leave the graph."""
+        """Carry what is on its way, tell the robots that were told to drive to stand, and leave the graph.
+
+        Nobody reaches them through here any more.
+        """
         self._closing = True
         self._wire.wake()
         self._pump.join()
+        while (event := self._wire.inbox.take(0.0)) is not None:
+            self._carry(event)
+        for route in self._driven:
+            if self._carried[route.topic]:
+                stamped = route.typename.endswith("Stamped")
+                frame = route.topic.rpartition("/")[0]
+                still = drive_message(STANDSTILL, time.time_ns(), frame, stamped=stamped)
+                self._carry(Event(route.topic, encode(still)))
+        self._graph.spin(_LINGER_S)
         self._graph.close()
 
     def _hear(self, topic: str, payload: bytes) -> None:
@@ -101,9 +120,22 @@ class RosBridge:
     def _carry_out(self) -> None:
         while not self._closing:
             event = self._wire.inbox.take(_PUMP_WAIT)
-            if event is not None and event.topic and not self._is_echo(event.topic, event.payload):
-                self._carried[event.topic] += 1
-                self._graph.publish(event.topic, event.payload)
+            if event is not None:
+                self._carry(event)
+
+    def _carry(self, event: Event) -> None:
+        if not event.topic or self._is_echo(event.topic, event.payload):
+            return
+        try:
+            self._graph.publish(event.topic, event.payload)
+        except Exception as error:
+            if not self._refused[event.topic]:
+                self._say(
+                    f"ROS refuses a message on {event.topic} ({error}); it is dropped, as others like it"
+                )
+            self._refused[event.topic] += 1
+            return
+        self._carried[event.topic] += 1
 
     def _is_echo(self, topic: str, payload: bytes) -> bool:
         """Whether this very message of a two-way route was carried just now, be it the other way."""
@@ -118,7 +150,8 @@ class RosBridge:
 
     def _report(self, now_ns: int) -> Outgoing:
         """What was carried, who listens, and what is wrong with that."""
-        values: dict[str, object] = {f"carried.{topic}": count for topic, count in self._carried.items()}
+        values: dict[str, object] = named_counts("carried", self._carried.copy())
+        values |= named_counts("refused", self._refused.copy())
         silent = [
             route.name
             for route in self._routes
@@ -129,6 +162,8 @@ class RosBridge:
             if route.drives:
                 types = self._graph.listeners(route.topic)
                 values[f"listeners.{route.topic}"] = len(types)
+                if not (route.due or self._carried[route.topic]):
+                    continue
                 for name, text in listener_findings(route.name, route.typename, types).items():
                     found.setdefault(name, []).append(text)
         begun = now_ns - self._begun_ns >= _PATIENCE_NS

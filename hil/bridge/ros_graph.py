@@ -17,11 +17,23 @@ _INSTALL = (
 )
 
 
-def require_ros(routes: tuple[Route, ...]) -> None:
-    """See that rclpy and the message packages of the routes are there; :class:`UsageError` if not."""
+def carried(routes: tuple[Route, ...], say: Callable[[str], None]) -> tuple[Route, ...]:
+    """The routes that ROS can carry here. A motion capture whose messages it does not know is left out.
+
+    That is said: it may come by another bridge. Raises :class:`UsageError` without rclpy, or another package.
+    """
     _imported("rclpy")
+    found = []
     for route in routes:
-        message_class(route.typename)
+        try:
+            message_class(route.typename)
+        except UsageError as error:
+            if not route.sensed:
+                raise
+            say(f"{route.name} is not brought in ({error})")
+            continue
+        found.append(route)
+    return tuple(found)
 
 
 class RosGraph:

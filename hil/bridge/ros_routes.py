@@ -22,7 +22,8 @@ class Route:
     """A topic that is carried: its ``name`` in ROS, its type, which way, and how it is kept there.
 
     ``way``: "in" from ROS to us. ``reliable``: else best effort, which hears any publisher. ``drives``: it
-    tells a robot to drive, so that nobody hearing it is a finding. ``optional``: it need not come.
+    tells a robot to drive, so that nobody hearing it is a finding once it was told something, or from the
+    beginning where it is ``due``. ``optional``: it need not come. ``sensed``: it is of a motion capture.
     """
 
     topic: str
@@ -32,7 +33,9 @@ class Route:
     reliable: bool
     depth: int
     drives: bool = False
+    due: bool = False
     optional: bool = False
+    sensed: bool = False
 
 
 def routes_of(scenario: Scenario) -> tuple[Route, ...]:
@@ -43,20 +46,21 @@ def routes_of(scenario: Scenario) -> tuple[Route, ...]:
     layout, types = layout_of(scenario), types_of(scenario)
     sources = {topic: each.typename for topic, each in source_topics(scenario).items()}
     sensed = sources or {RIGID_BODIES: types[RIGID_BODIES]}
+    captured = frozenset(sensed)
     pairs = [link_topics(link) for link in links_of(scenario)]
     for topic in (odom for pair in pairs for odom in (pair.leader_odom, pair.odom)):
         sensed[topic] = types[topic]
 
     def route(topic: str, way: Way, depth: int, *, reliable: bool = True) -> Route:
         kind = sensed.get(topic) or types[topic]
-        return Route(topic, f"/{layout.name(topic)}", kind, way, reliable, depth)
+        return Route(topic, f"/{layout.name(topic)}", kind, way, reliable, depth, sensed=topic in captured)
 
     first = pairs[0].leader_cmd_vel
     return (
         *(route(topic, "in", SENSOR_DEPTH, reliable=False) for topic in sensed),
         *(replace(route(pair.side, "in", _ORDER_DEPTH), optional=True) for pair in pairs),
-        route(first, "out", 1),
-        *(replace(route(pair.cmd_vel, "out", 1), drives=True) for pair in pairs),
+        replace(route(first, "out", 1), drives=True),
+        *(replace(route(pair.cmd_vel, "out", 1), drives=True, due=True) for pair in pairs),
         route(DIAGNOSTICS, "out", _ORDER_DEPTH),
         route(STOP, "both", _ORDER_DEPTH),
     )

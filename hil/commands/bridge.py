@@ -88,12 +88,11 @@ def bridge_ros2(**given: Unpack[_Given]) -> None:
     """Join a ROS 2 network by rclpy: motion capture and odometry of SCENARIO in, commands out."""
     with collector_paused():
         from hil.bridge.ros_bridge import RosBridge
-        from hil.bridge.ros_graph import RosGraph, require_ros
+        from hil.bridge.ros_graph import RosGraph, carried
         from hil.bridge.ros_routes import routes_of
 
     chosen = load_scenario(given["scenario"], given["overrides"])
-    routes, domain = routes_of(chosen), chosen.wire.domain or None
-    require_ros(routes)
+    routes, domain = carried(routes_of(chosen), _say), chosen.wire.domain or None
     _run(
         lambda wire: RosBridge(wire, routes, lambda hear: RosGraph("abreast", domain, routes, hear), _say),
         chosen,

@@ -153,15 +153,29 @@ def _on_report() -> Callable[[bytes], None]:
     return hear
 
 
-def watch_of(order: Order) -> Callable[[Wire], ListenerWatch]:
-    """What watches who listens to the robots that are driven."""
+def watch_of(name: str, order: Order) -> Callable[[Wire], ListenerWatch] | None:
+    """What watches who listens to the robots that a daemon drives, if it drives any."""
     from hil.live.listener_watch import Commanded, ListenerWatch
     from hil.wire.key_layout import layout_of
     from hil.wire.topics import link_topics
 
     named = [(link.node_name("listeners"), link_topics(link)) for link in order.links]
     robots = [Commanded(node, each.cmd_vel, each.odom) for node, each in named]
+    if name == "leader" and not order.by_hand:
+        first = named[0][1]
+        robots = [Commanded("leader_listeners", first.leader_cmd_vel, first.leader_odom)]
+    elif name not in ("follower", "controller"):
+        return None
     return lambda wire: ListenerWatch(wire, layout_of(order.scenario), robots, _on_report())
+
+
+def overheard(name: str, order: Order) -> frozenset[str]:
+    """Commands to followers that a daemon hears for the start alone, which are meant for their robots."""
+    from hil.wire.topics import link_topics
+
+    if name == "leader" or (name == "emulator" and order.scenario.source.emulated == "leader"):
+        return frozenset(link_topics(link).cmd_vel for link in order.links)
+    return frozenset()
 
 
 def _parting(name: str, order: Order) -> Parting:

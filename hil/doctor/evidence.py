@@ -6,14 +6,17 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from formation.pose import Motion, Pose
+from hil.nodes.findings import Findings, findings_in
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.events import Event
 from hil.wire.lab_robots import LabRobot, robots_of
-from hil.wire.message_checks import ACCEPTED, place_cause, planar
+from hil.wire.message_checks import ACCEPTED, leader_cause, place_cause, planar
 from hil.wire.messages import MalformedPayloadError, decode_as
 from hil.wire.pose_sources import places_of
+
+_BRIDGES = "bridge/"
 
 
 class Seen(NamedTuple):
@@ -46,13 +49,17 @@ class Asked(NamedTuple):
 
 @dataclass(slots=True)
 class Evidence:
-    """All that was heard: frames, and odometry and commands by topic. ``unread``: how many made no sense."""
+    """All that was heard: frames, and odometry and commands by topic. ``unread``: how many made no sense.
+
+    ``reported``: what bridges find, who see what lies behind them and does not show on the wire.
+    """
 
     scenario: Scenario
     frames: list[Seen] = field(default_factory=list)
     odometry: dict[str, list[Rolled]] = field(default_factory=dict)
     commands: dict[str, list[Asked]] = field(default_factory=dict)
     unread: dict[str, int] = field(default_factory=dict)
+    reported: dict[str, Findings] = field(default_factory=dict)
     robots: tuple[LabRobot, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -62,13 +69,26 @@ class Evidence:
     def topics(self) -> tuple[str, ...]:
         """What there is to hear."""
         robots = self.robots
-        return (topics.RIGID_BODIES, *(each.odom for each in robots), *(each.cmd_vel for each in robots))
+        driven = [topic for each in robots for topic in (each.odom, each.cmd_vel)]
+        return (topics.RIGID_BODIES, topics.DIAGNOSTICS, *driven)
+
+    def reported_findings(self) -> list[tuple[str, str]]:
+        """Names of the findings that bridges have, and their texts behind the bridge's name."""
+        return [
+            (name, f"{node}: {text}")
+            for node, findings in self.reported.items()
+            for name, text in findings.items()
+        ]
 
     def hear(self, event: Event, now_ns: int) -> None:
         """Take down a message; what cannot be read is counted."""
         try:
             if event.topic == topics.RIGID_BODIES:
-                self.frames.append(_seen(decode_as(event.payload, msg.RigidBodies), now_ns))
+                frame = decode_as(event.payload, msg.RigidBodies)
+                self.frames.append(_seen(frame, now_ns, self.robots[0].body))
+            elif event.topic == topics.DIAGNOSTICS:
+                found = findings_in(decode_as(event.payload, msg.DiagnosticArray))
+                self.reported |= {node: each for node, each in found.items() if node.startswith(_BRIDGES)}
             elif event.topic in {each.odom for each in self.robots}:
                 rolled = _rolled(decode_as(event.payload, msg.Odometry), now_ns)
                 self.odometry.setdefault(event.topic, []).append(rolled)
@@ -81,9 +101,13 @@ class Evidence:
             self.unread[event.topic] = self.unread.get(event.topic, 0) + 1
 
 
-def _seen(frame: msg.RigidBodies, now_ns: int) -> Seen:
+def _seen(frame: msg.RigidBodies, now_ns: int, leader: str) -> Seen:
     places = places_of(frame)
-    sound = {each.body: planar(each.place) for each in places if place_cause(each.place) == ACCEPTED}
+    sound = {
+        each.body: planar(each.place)
+        for each in places
+        if (leader_cause if each.body == leader else place_cause)(each.place) == ACCEPTED
+    }
     names = tuple(each.body for each in places)
     return Seen(now_ns, _stamp_ns(frame.header), frame.frame_number, names, sound)
 

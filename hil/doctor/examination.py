@@ -64,7 +64,12 @@ class Examination:
     def checks(self, graph: Sequence[Endpoint], layout: KeyLayout, now_ns: int) -> Iterator[Check]:
         """What was seen. ``graph``: who publishes and who hears what, as far as it shows."""
         yield from frame_checks(self.found)
+        for source, known in self._sources:
+            if text := source.differing(known):
+                yield Check("frames_of_reference", False, text, "one", advice_on("frames_of_reference"))
         yield from robot_checks(self.found, graph, layout)
+        for name, text in self.found.reported_findings():
+            yield Check(name, False, text, "nothing", advice_on(name))
         for node, state in self._estimators:
             for name, text in node.findings(state, now_ns).items():
                 yield Check(name, False, text, "what estimates can rest on", advice_on(name))
@@ -86,7 +91,7 @@ class Examination:
 
     def hindrance(self, robot: LabRobot) -> Check | None:
         """Why a robot is not to be driven now, if it is not: it cannot obey two."""
-        others = len(self.found.commands.get(robot.cmd_vel, []))
+        others = len(self.found.commands.get(robot.cmd_vel, [])) + self.found.unread.get(robot.cmd_vel, 0)
         if not others:
             return None
         seen = f"{robot.name}: {others} commands of somebody else on {robot.cmd_vel}; it was not driven"

@@ -26,7 +26,7 @@ def robot_checks(found: Evidence, graph: Sequence[Endpoint], layout: KeyLayout) 
         yield _odometry(found, robot, rolled)
         if rolled:
             yield _odometry_clock(robot, rolled)
-        yield from _listener(robot, graph, layout, may_be_deaf=robot == found.robots[0])
+        yield from _listener(found, robot, graph, layout)
         yield _one_sender(found, robot, graph, layout)
 
 
@@ -58,23 +58,24 @@ def _odometry_clock(robot: LabRobot, rolled: Sequence[Rolled]) -> Check:
 
 
 def _listener(
-    robot: LabRobot, graph: Sequence[Endpoint], layout: KeyLayout, *, may_be_deaf: bool
+    found: Evidence, robot: LabRobot, graph: Sequence[Endpoint], layout: KeyLayout
 ) -> Iterator[Check]:
-    """Whether the robot hears its commands, where it shows in the graph at all.
+    """Whether the robot hears its commands, where it shows in the graph at all, and as bridges see it.
 
-    ``may_be_deaf``: that of the leader, who may be driven by hand.
+    The leader may be deaf: who drives it by hand does.
     """
     told, odom = (layout.within(layout.name(topic)) for topic in (robot.cmd_vel, robot.odom))
     if not any(each.publishes and each.key == odom for each in graph):
         return
     heard_as = [each.typename for each in graph if not each.publishes and each.key == told]
     typename = layout.types[robot.cmd_vel]
-    if may_be_deaf and not heard_as:
+    if robot == found.robots[0] and not heard_as:
         return
     wrong = listener_findings(f"/{layout.name(robot.cmd_vel)}", typename, heard_as)
     for name, text in wrong.items():
         yield Check(name, False, text, f"the robot listens for {typename}", advice_on(name))
-    if not wrong:
+    behind = any(f"/{layout.name(robot.cmd_vel)}" in text for _, text in found.reported_findings())
+    if not wrong and not behind:
         yield Check("listens", True, f"{robot.name} listens to its commands", typename)
 
 

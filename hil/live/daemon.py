@@ -45,10 +45,14 @@ class Worker(Protocol):
 
 
 class Presence(NamedTuple):
-    """What the ROS graph calls a worker, and what makes the watch on who listens to it there."""
+    """What the ROS graph calls a worker, and what makes the watch on who listens to it there.
+
+    ``overhears``: topics that it hears though they are meant for others: it shows as no listener there.
+    """
 
     name: str = ""
     make_watch: Callable[[Wire], ListenerWatch] | None = None
+    overhears: frozenset[str] = frozenset()
 
 
 ANONYMOUS = Presence()
@@ -119,8 +123,9 @@ def run_daemon(
         ending.notify(wire.wake)
         worker = make_worker()
         worker.begin(time.time_ns())
-        # Who takes down everything is not who a message is meant for.
-        wire.subscribe(worker.subscribes, shown=not worker.thorough)
+        for topic in worker.subscribes:
+            # Who takes down everything is not who a message is meant for.
+            wire.subscribe([topic], shown=not worker.thorough and topic not in presence.overhears)
         # What is loaded by now stays for good; walking it again would halt a live step for 100 ms and more.
         gc.freeze()
         watch = presence.make_watch(wire) if presence.make_watch else None

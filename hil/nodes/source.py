@@ -98,10 +98,15 @@ class SourceNode:
         if state.strangers:
             values["others"] = ", ".join(sorted(state.strangers))
         values |= named_counts("taken", state.taken) | named_counts("refused", state.refused)
-        if state.frame_ids:
-            values |= named_findings({"frames_of_reference": _differing(state.frame_ids)})
+        if text := self.differing(state):
+            values |= named_findings({"frames_of_reference": text})
         problem = self._missed(state, missing) if missing else ""
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
+
+    def differing(self, state: SourceState) -> str:
+        """That bodies are told in different frames of reference, empty if they are not."""
+        told = ", ".join(f"{body!r} in {frame!r}" for body, frame in state.frame_ids.items())
+        return f"bodies are told in different frames of reference: {told}; expected one" if told else ""
 
     def _missed(self, state: SourceState, missing: list[str]) -> str:
         names = ", ".join(map(repr, missing))
@@ -120,6 +125,10 @@ class SourceNode:
             return
         state.taken = counted(state.taken, "message")
         known = [each for each in places if each.body in self._bodies]
+        if self._given.type not in _IN_PARTS and len({each.body for each in known}) < len(known):
+            # Nobody can tell which of the two it is.
+            state.refused = counted(state.refused, "duplicate_body")
+            return
         state.strangers.update(
             each.body for each in places[:_MOST_STRANGERS] if each not in known and len(state.strangers) < 20
         )
@@ -166,8 +175,3 @@ class SourceNode:
         head = header(gathered.at_ns, gathered.places[0].frame_id)
         frame = msg.RigidBodies(head, state.number % 2**32, bodies)
         yield outgoing(self._frames, frame, gathered.at_ns)
-
-
-def _differing(frame_ids: dict[str, str]) -> str:
-    told = ", ".join(f"{body!r} in {frame!r}" for body, frame in frame_ids.items())
-    return f"bodies are told in different frames of reference: {told}; expected one"

@@ -16,15 +16,19 @@ from hil.doctor.drive_checks import REST_S, Span
 from hil.doctor.examination import Examination
 from hil.emulator.node import EmulatorNode
 from hil.errors import UsageError
+from hil.nodes.findings import named_findings
+from hil.nodes.node import diagnostics
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
 from hil.wire.drive_message import drive_message
 from hil.wire.events import TICK, Event
 from hil.wire.key_layout import layout_of
 from hil.wire.lab_robots import LabRobot
-from hil.wire.messages import decode_as, encode, typename_of
+from hil.wire.messages import decode_as, encode, header, typename_of
+from hil.wire.pose_sources import message_of
+from hil.wire.records import Placement
 from hil.wire.ros_tokens import Endpoint
-from hil.wire.topics import RIGID_BODIES
+from hil.wire.topics import DIAGNOSTICS, RIGID_BODIES
 
 BEGUN_NS = 1_700_000_000_000_000_000
 FOLLOWER_CMD = "follower/cmd_vel"
@@ -268,3 +272,58 @@ def test_robots_are_known_by_name_body_or_namespace() -> None:
     with pytest.raises(UsageError, match="no such robot; one of: leader, follower"):
         lab.examination.robot("burger")
     assert math.isfinite(lab.now_ns)
+
+
+def test_what_a_bridge_finds_behind_it_counts_and_no_listener_of_its_own_does() -> None:
+    lab = Lab(
+        graph=(
+            Endpoint("bridge", True, "follower/odom", "nav_msgs/msg/Odometry"),
+            Endpoint("bridge", False, "follower/cmd_vel", "geometry_msgs/msg/TwistStamped"),
+        )
+    )
+    lab.listen(1.0)
+    found = named_findings({"deaf_robot": "nobody listens to /follower/cmd_vel, expected its robot to"})
+    report = Event(DIAGNOSTICS, encode(diagnostics("bridge/ros2", lab.now_ns, "", found)))
+    lab.examination.hear(report, lab.now_ns)
+    checks = list(lab.examination.checks(lab.graph, layout_of(lab.scenario), lab.now_ns))
+    (deaf,) = (each for each in checks if each.name == "deaf_robot")
+    assert not deaf.ok
+    assert deaf.seen == "bridge/ros2: nobody listens to /follower/cmd_vel, expected its robot to"
+    assert "listens" not in {each.name for each in checks}
+
+
+def test_a_leader_without_orientation_is_seen_all_the_same() -> None:
+    nothing = msg.Quaternion(x=0.0, y=0.0, z=0.0, w=0.0)
+
+    def edit(frame: msg.RigidBodies, _: int) -> msg.RigidBodies:
+        leader, follower = frame.rigidbodies
+        bare = replace(leader, pose=replace(leader.pose, orientation=nothing))
+        return replace(frame, rigidbodies=[bare, follower])
+
+    assert Lab(change=frames(edit)).looked() == {}
+
+
+def test_bodies_in_two_frames_of_reference_are_named_by_both() -> None:
+    scenario = load_scenario("turtlebot3", ["source.type=PoseStamped"])
+    examination = Examination(scenario, BEGUN_NS)
+    for name in ("leader", "follower"):
+        place = Placement(0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0)
+        told = message_of("PoseStamped", header(BEGUN_NS, f"{name}/odom"), [(name, place)])
+        examination.hear(Event(f"source/vrpn_mocap/{name}/pose", encode(told)), BEGUN_NS)
+    (found,) = (
+        each
+        for each in examination.checks((), layout_of(scenario), BEGUN_NS)
+        if each.name == "frames_of_reference"
+    )
+    assert "'leader' in 'leader/odom', 'follower' in 'follower/odom'" in found.seen
+
+
+def test_whom_somebody_else_commands_is_not_driven_be_it_by_another_type() -> None:
+    lab = Lab()
+    robot = lab.examination.robot("follower")
+    assert lab.examination.hindrance(robot) is None
+    told = drive_message(Motion(0.1, 0.0), lab.now_ns, "follower", stamped=False)
+    lab.examination.hear(Event(robot.cmd_vel, encode(told)), lab.now_ns)
+    hindrance = lab.examination.hindrance(robot)
+    assert hindrance is not None
+    assert "1 commands of somebody else" in hindrance.seen

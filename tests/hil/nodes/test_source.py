@@ -154,3 +154,14 @@ def test_what_is_no_frame_the_emulated_lab_does_not_tell() -> None:
     with_nobody = ForeignMocapNode(load_scenario("turtlebot3", ["source.type=TFMessage"]))
     (told,) = with_nobody.step(None, Event(RIGID_BODIES, empty.payload), NS)[1]
     assert told.stamp_ns == NS
+
+
+@pytest.mark.parametrize("kind", ["RigidBodies", "NamedPoseArray"])
+def test_a_message_that_has_a_body_twice_is_refused(kind: SourceType) -> None:
+    scenario = load_scenario("turtlebot3", [*NAMED, f"source.type={kind}", "source.scale=0.01"])
+    node, place = SourceNode(scenario), Placement(1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0)
+    state = node.begin(NS)
+    told = message_of(kind, header(NS, "world"), [(body, place) for body in ("1", "2", "1")])
+    (topic,) = node.subscribes
+    assert fed(node, state, [(Event(topic, encode(told)), NS)]) == []
+    assert state.refused == {"duplicate_body": 1}
