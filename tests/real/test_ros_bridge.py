@@ -64,6 +64,18 @@ def test_frames_and_odometry_come_in_and_commands_go_out(lab: Lab, peers: Path) 
     assert findings_in(report) == {"bridge/ros2": {}}
 
 
+def test_a_bridge_that_ends_leaves_the_robot_standing(peers: Path) -> None:
+    """It keeps its last command for ever, and nobody reaches it any more."""
+    lab = Lab(domain=96)
+    with router() as (endpoint, wire), standing(lab, peers) as (robots, _):
+        with bridge(lab, endpoint, peers):
+            drive(lab, wire, "follower/cmd_vel", 4.0)
+        time.sleep(1.5)
+        follower = json.loads(robots.finish()[-1])["/follower"]
+    assert follower["heard"] > 10
+    assert max(map(abs, follower["speed"])) < 0.001
+
+
 @pytest.mark.parametrize(
     ("lab", "finding"),
     [
