@@ -30,7 +30,7 @@ PATIENCE, OFF_M, DRIVEN_S, LOOKED_S = 400.0, 0.003, 35.0, 6.0
 LEADER_MOUNT, FOLLOWER_MOUNT = (0.02, 0.0, 0.0), (0.012, 0.0, 0.05)
 """How the bodies sit on the robots, which nobody is told."""
 
-NEEDED = {"scripts/setup", "export", "ros2", "local", "allow"}
+NEEDED = {"scripts/setup", "pip", "export", "ros2", "local", "allow"}
 """What begins lines that are not ours: robots and clocks, which are others here."""
 
 
@@ -117,7 +117,6 @@ def wait_until_driven(topic: str, run: Peer) -> None:
 
 def test_the_path_leads_to_a_formation(peers: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("ROS_DOMAIN_ID", "30")
     path, scenario, port = Steps(), tmp_path / "my_lab.toml", free_port()
     scenario.write_text(path.scenario, encoding="utf-8")
     lab = Lab(
@@ -136,9 +135,10 @@ def test_the_path_leads_to_a_formation(peers: Path, tmp_path: Path, monkeypatch:
         wheels.wait_for("ready")
         with placed(lab, port, peers) as robots:
             done(path.take("doctor"))
-            creep = path.take("doctor")
-            refused = re.findall(r"^ *no +(\w+)", done(creep, 1).stdout, re.MULTILINE)
-            assert set(refused) == {"frame_pivot"}
+            creeps = [path.take("doctor"), path.take("doctor")]
+            for creep in creeps:
+                refused = re.findall(r"^ *no +(\w+)", done(creep, 1).stdout, re.MULTILINE)
+                assert set(refused) == {"frame_pivot"}
             told = {"domain": 30, "robots": lab.namespaces, "seconds": DRIVEN_S}
             recorder = path.take("recorder")
             with peer("hand", [str(HERE / "rclpy_teleop.py"), json.dumps(told)], peers):
@@ -149,7 +149,8 @@ def test_the_path_leads_to_a_formation(peers: Path, tmp_path: Path, monkeypatch:
         assert found.follower.mount == pytest.approx(FOLLOWER_MOUNT, abs=0.004)
         assert found.leader.mount == pytest.approx(LEADER_MOUNT, abs=0.004)
         with placed(lab, port, peers) as robots:
-            done(creep)
+            for creep in creeps:
+                done(creep)
             robots.finish()
         drive = path.take("run")
         with placed(lab, port, peers) as robots:
