@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from formation.pose import STANDSTILL, Motion
+from hil.live.reported_number import reported_number
 from hil.nodes.findings import PREFIX, findings_in, findings_json
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
@@ -134,9 +135,9 @@ class LabState:
         heard, status = self._daemons[name]
         values = {each.key: each.value for each in status.values if not each.key.startswith(PREFIX)}
         refused = {
-            key.removeprefix(_REFUSED): int(value)
+            key.removeprefix(_REFUSED): count
             for key, value in values.items()
-            if key.startswith(_REFUSED) and value.isdigit()
+            if key.startswith(_REFUSED) and (count := reported_number(value)) is not None
         }
         report = msg.DiagnosticArray(header=_NO_HEADER, status=[status])
         (found,) = findings_in(report).values()

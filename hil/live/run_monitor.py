@@ -12,6 +12,7 @@ import zenoh
 
 from estimation.tracking.tracker import Status
 from formation.pose import Motion
+from hil.live.reported_number import reported_number
 from hil.nodes.findings import Findings, findings_in
 from hil.scenario.links import STARTERS
 from hil.wire import message_types as msg
@@ -178,8 +179,10 @@ class RunMonitor:
             self.snapshot.heard[name] = self.snapshot.observed_s
             self.snapshot.problems[name] = status.message if status.level else ""
             for value in status.values:
-                if name in STARTERS and value.key == "motion_since_ns" and value.value.isdecimal():
-                    self.snapshot.motion_since_ns = min(int(value.value), stamp_ns)
+                if name not in STARTERS or value.key != "motion_since_ns":
+                    continue
+                if (since_ns := reported_number(value.value)) is not None:
+                    self.snapshot.motion_since_ns = min(since_ns, stamp_ns)
 
 
 def _told_of(pair: Topics) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ import pytest
 
 from formation.pose import STANDSTILL, Motion, Pose
 from hil.emulator.lab_messages import odometry_message
+from hil.nodes.node import diagnostics
 from hil.wire.drive_message import drive_message
 from hil.wire.message_types import String, TwistStamped
 from hil.wire.messages import decode_as, encode
@@ -117,6 +118,17 @@ def test_status_tells_what_passes_as_json(lab: tuple[str, Wire]) -> None:
     assert (told["daemons"], told["missing_bodies"]) == ([], ["leader", "follower"])
     shown = ran("status", "--once", "--connect", endpoint)
     assert "not seen" in shown.stdout
+
+
+def test_status_shows_what_looks_like_markup_as_it_is(lab: tuple[str, Wire]) -> None:
+    endpoint, wire = lab
+    report = diagnostics("estimator[0]", 5, "[/lab] waits for [source]", {"refused.[b]": 7, "refused.c": "²"})
+    with again(wire, ("diagnostics", encode(report))):
+        shown = ran("status", "--once", "--connect", endpoint)
+    assert shown.returncode == 0, shown.stderr
+    text = " ".join(shown.stdout.split())
+    for part in ("estimator[0]", "[/lab] waits for [source]", "refused: 7 [b]"):
+        assert part in text
 
 
 @pytest.mark.parametrize("command", ["status", "stop"])

@@ -82,6 +82,14 @@ def test_a_robot_is_heard_of_by_its_odometry_or_by_what_it_is_told() -> None:
     assert state.unheard() == []
 
 
+def test_a_count_that_is_no_number_is_not_one() -> None:
+    state = LabState(SCENARIO)
+    refused = {"refused.tilted": 7, "refused.late": "²", "refused.lost": "7" * 5000}
+    told(state, topics.DIAGNOSTICS, diagnostics("estimator", 5, "", refused), 1.0)
+    (estimator,) = state.as_dict(1.0)["daemons"]
+    assert estimator["refused"] == {"tilted": 7}
+
+
 def test_a_robot_that_takes_no_stamps_is_read_too() -> None:
     state = LabState(load_scenario("turtlebot3", ["controller.command_type=Twist"]))
     told(state, "follower/cmd_vel", drive_message(Motion(0.2, 0.3), 5, "robot", stamped=False), 1.0)
