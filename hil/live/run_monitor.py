@@ -74,7 +74,9 @@ class Snapshot:
         if unheard:
             patience = " yet; a first start compiles for minutes" if self.observed_s > _COMPILES_S else ""
             return f"nothing was heard of {', '.join(unheard)}{patience}"
-        return "; ".join(f"{name}: {problem}" for name, problem in self.problems.items() if problem)
+        # A copy: Zenoh's thread may add to it meanwhile.
+        said = list(self.problems.items())
+        return "; ".join(f"{name}: {problem}" for name, problem in said if problem)
 
     def silent(self, names: Iterable[str], patience: float) -> str | None:
         """A node that has reported before but not in the last ``patience`` [s]."""

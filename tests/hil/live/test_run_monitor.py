@@ -115,3 +115,18 @@ def test_a_time_of_the_start_that_is_no_number_is_none() -> None:
     finally:
         monitor.close()
         close_session(session)
+
+
+def test_a_node_may_report_while_it_is_said_what_the_start_waits_for() -> None:
+    snapshot = Snapshot()
+
+    class Meanwhile(str):
+        """A problem that another node reports beside while this one is read."""
+
+        def __bool__(self) -> bool:
+            snapshot.problems["controller"] = "waiting for an estimate"
+            return True
+
+    snapshot.problems["estimator"] = Meanwhile("waiting for mocap")
+    assert snapshot.waits_for(()) == "estimator: waiting for mocap"
+    assert snapshot.waits_for(()) == "estimator: waiting for mocap; controller: waiting for an estimate"
