@@ -37,6 +37,8 @@ FIRST_WORD_TIMEOUT = 900.0
 SILENCE = 3.0
 STANDSTILL_TIMEOUT = 10.0
 _GLANCE = 0.05
+_LAST_BREATH = 1.0
+"""From the stop that a daemon says as it breaks down to its end [s]."""
 
 Show = Callable[[Snapshot, float | None], None]
 
@@ -113,10 +115,12 @@ class _Supervisor:
             now = time.monotonic()
             if set_off is None and snapshot.motion_since_ns is not None:
                 set_off = now - (time.time_ns() - snapshot.motion_since_ns) * 1e-9
+            if set_off is None and snapshot.stopped is not None:
+                failure = failure or self._stopped_early()
             if len(snapshot.heard) > known:
                 begun, known = now, len(snapshot.heard)
             patience = START_TIMEOUT if self._all_heard(snapshot) else FIRST_WORD_TIMEOUT
-            if set_off is None and now - begun > patience and not self._may_wait(snapshot):
+            if set_off is None and not failure and now - begun > patience and not self._may_wait(snapshot):
                 failure = (
                     f"the start barrier did not open within {patience:g} s: "
                     f"{snapshot.waits_for(self._nodes) or 'no daemon says why'}"
@@ -155,6 +159,16 @@ class _Supervisor:
             return f"the {ended.name} {how}" + (f": {words}" if code > 0 and words else "")
         silent = self._monitor.snapshot.silent(self._nodes, SILENCE)
         return f"the {silent} has said nothing for {SILENCE:g} s" if silent else ""
+
+    def _stopped_early(self) -> str:
+        """That somebody stopped everybody before the leader set off, unless it has set off after all.
+
+        A daemon that breaks down says stop with its last breath: then its end is what is wrong.
+        """
+        failure, snapshot = self._failure(_LAST_BREATH), self._monitor.update()
+        if failure or snapshot.motion_since_ns is not None:
+            return failure
+        return f"stopped before the leader set off: {snapshot.stopped}"
 
     def _stop(self, reason: str) -> None:
         """Stop everybody, speak for drivers that may be gone, and wait until the robots stand."""

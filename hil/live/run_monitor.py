@@ -14,6 +14,7 @@ from estimation.tracking.tracker import Status
 from formation.pose import Motion
 from hil.live.reported_number import reported_number
 from hil.nodes.findings import Findings, findings_in
+from hil.nodes.leader_driver import stop_reason
 from hil.scenario.links import STARTERS
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -36,7 +37,7 @@ class Snapshot:
 
     ``followers``: their names from the leader on. ``observed_s``: for how long we have looked. ``heard``: at
     which ``observed_s`` each node last reported, ``problems``: what it said, ``findings``: what it found.
-    ``wheels``: what real robots say of their own motion, by topic.
+    ``wheels``: what real robots say of their own motion, by topic. ``stopped``: by what stop.
     """
 
     followers: tuple[str, ...] = ()
@@ -45,6 +46,7 @@ class Snapshot:
     problems: dict[str, str] = field(default_factory=dict)
     findings: dict[str, Findings] = field(default_factory=dict)
     motion_since_ns: int | None = None
+    stopped: str | None = None
     estimates: dict[str, msg.LeaderEstimate] = field(default_factory=dict)
     certified: dict[str, msg.CertifiedEstimate] = field(default_factory=dict)
     commands: dict[str, msg.Command] = field(default_factory=dict)
@@ -130,7 +132,7 @@ class RunMonitor:
         self._diagnostics = session.declare_subscriber(layout.heard(topics.DIAGNOSTICS), self._on_diagnostics)
         self._newest = {
             topic: session.declare_subscriber(layout.heard(topic), zenoh.handlers.RingChannel(1))
-            for topic in (*wheels, *(topic for pair in pairs for topic in _told_of(pair)))
+            for topic in (topics.STOP, *wheels, *(topic for pair in pairs for topic in _told_of(pair)))
         }
         self._pairs, self._wheels = pairs, wheels
 
@@ -144,6 +146,8 @@ class RunMonitor:
         snapshot, now = self.snapshot, time.monotonic()
         snapshot.advance(now - self._updated_at)
         self._updated_at = now
+        if topics.STOP in latest and snapshot.stopped is None:
+            snapshot.stopped = stop_reason(latest[topics.STOP])
         for pair in self._pairs:
             who = pair.follower
             if seen := _sound(latest, pair.estimate, msg.LeaderEstimate):
