@@ -62,10 +62,10 @@ class Snapshot:
             for truth in truths
         )
 
-    @property
-    def wheels_stand(self) -> bool:
-        """Whether all real robots stand that were heard of."""
-        return all(abs(each.v) < _STILL_V and abs(each.u) < _STILL_U for each in self.wheels.values())
+    def stands(self, wheels: str) -> bool:
+        """Whether a real robot says that it stands, by the topic of its odometry."""
+        motion = self.wheels.get(wheels)
+        return motion is not None and abs(motion.v) < _STILL_V and abs(motion.u) < _STILL_U
 
     def waits_for(self, names: Iterable[str]) -> str:
         """What the start waits for, in words, empty for nothing that anybody tells.

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
+from formation.pose import Motion, Pose
+from hil.emulator.lab_messages import odometry_message
+from hil.live import run
 from hil.live.child_processes import Children
 from hil.live.crew import Crew
 from hil.live.daemon import Ending
@@ -56,6 +61,25 @@ def outcome_of(supervisor: _Supervisor, wire: Wire, *said: tuple[str, msg.Messag
     return supervisor.run(Ending(), show)
 
 
+@contextmanager
+def robot(wire: Wire, name: str, v: float) -> Iterator[threading.Event]:
+    """A robot that tells all the time how fast it is and heeds nobody, until its link is gone."""
+    gone = threading.Event()
+
+    def tell() -> None:
+        while not gone.wait(0.02):
+            odometry = odometry_message(5, name, Pose(0.0, 0.0, 0.0), Motion(v, 0.0))
+            wire.publish(f"{name}/odom", encode(odometry))
+
+    telling = threading.Thread(target=tell)
+    telling.start()
+    try:
+        yield gone
+    finally:
+        gone.set()
+        telling.join()
+
+
 STOP = topics.STOP, msg.String(data="enough")
 
 
@@ -78,3 +102,52 @@ def test_a_stop_after_that_is_no_failure(lab: tuple[Wire, _Supervisor]) -> None:
     set_off = diagnostics("leader", now_ns, "", {"motion_since_ns": now_ns})
     outcome = outcome_of(supervisor, wire, (topics.DIAGNOSTICS, set_off), STOP)
     assert outcome.failure == ""
+
+
+def set_off() -> tuple[str, msg.Message]:
+    now_ns = time.time_ns()
+    return topics.DIAGNOSTICS, diagnostics("leader", now_ns, "", {"motion_since_ns": now_ns})
+
+
+def test_robots_that_say_that_they_stand_are_said_to(lab: tuple[Wire, _Supervisor]) -> None:
+    wire, supervisor = lab
+    with robot(wire, "leader", 0.0), robot(wire, "follower", 0.0):
+        outcome = outcome_of(supervisor, wire, set_off())
+    assert (outcome.failure, outcome.robots) == ("", "the robots stand")
+
+
+def test_a_robot_that_drives_on_fails_the_run(
+    lab: tuple[Wire, _Supervisor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run, "STANDSTILL_TIMEOUT", 1.0)
+    wire, supervisor = lab
+    with robot(wire, "leader", 0.0), robot(wire, "follower", 0.1):
+        outcome = outcome_of(supervisor, wire, set_off())
+    assert outcome.failure == "follower has not been seen to stand within 1 s; use its switch"
+    assert outcome.robots == "the robots were told to stand, leader seen to"
+
+
+def test_what_robots_said_before_their_links_were_gone_is_no_standstill(
+    lab: tuple[Wire, _Supervisor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run, "STANDSTILL_TIMEOUT", 1.0)
+    wire, supervisor = lab
+    with robot(wire, "leader", 0.0) as leader_gone, robot(wire, "follower", 0.0) as follower_gone:
+        time.sleep(0.2)
+        leader_gone.set()
+        follower_gone.set()
+        time.sleep(0.2)
+        outcome = outcome_of(supervisor, wire, STOP)
+    assert outcome.failure == (
+        "stopped before the leader set off: enough; "
+        "leader, follower have not been seen to stand within 1 s; use their switch"
+    )
+    assert outcome.robots == "the robots were told to stand"
+
+
+def test_robots_that_tell_nothing_of_their_motion_are_not_said_to_stand(
+    lab: tuple[Wire, _Supervisor],
+) -> None:
+    wire, supervisor = lab
+    outcome = outcome_of(supervisor, wire, set_off())
+    assert (outcome.failure, outcome.robots) == ("", "the robots were told to stand")
