@@ -26,6 +26,7 @@ from hil.scenario.links import chain_of, links_of, refuse_chain
 from hil.scenario.schema import Scenario
 
 if TYPE_CHECKING:
+    from hil.live.run import Outcome
     from hil.wire.session import Endpoints
 
 
@@ -163,11 +164,12 @@ def _run(chosen: Scenario, folder: Path, live: _Live | None, *, as_json: bool) -
     log_path = folder / "run.mcap"
     if log_path.exists():
         raise UsageError(f"{log_path} exists already; give another --out, or move it away")
-    failure, timing = "", {}
+    failure, left, timing = "", "", {}
     if live is None:
         timing = {"lockstep": _lockstep(chosen, log_path)}
     else:
-        failure = _live(chosen, log_path, live)
+        outcome = _live(chosen, log_path, live)
+        failure, left = outcome.failure, f"{outcome.robots}, "
     if not log_path.exists():
         raise CheckFailedError(failure or "interrupted before anything was recorded")
     try:
@@ -181,9 +183,7 @@ def _run(chosen: Scenario, folder: Path, live: _Live | None, *, as_json: bool) -
     finally:
         # Also if there is no room for a verdict, say: what went wrong first is what to tell.
         if failure:
-            raise CheckFailedError(
-                f"the run broke down: {failure}; the robots were stopped, the log is {log_path}"
-            )
+            raise CheckFailedError(f"the run broke down: {failure}; {left}the log is {log_path}")
 
 
 def _folder(scenario: Scenario, out: Path | None) -> Path:
@@ -202,7 +202,7 @@ def _lockstep(scenario: Scenario, log_path: Path) -> dict[str, float]:
     return timing
 
 
-def _live(scenario: Scenario, log_path: Path, live: _Live) -> str:
+def _live(scenario: Scenario, log_path: Path, live: _Live) -> Outcome:
     from rich.console import Console
     from rich.text import Text
 
@@ -241,8 +241,10 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> str:
         finally:
             ending.leave_signals()
     if outcome.interrupted:
-        console.print(f"interrupted after {outcome.duration_s:.1f} s; the robots stand, the log is whole")
-    return outcome.failure
+        # Names may look like markup.
+        said = f"interrupted after {outcome.duration_s:.1f} s; {outcome.robots}, the log is whole"
+        console.print(Text(said), soft_wrap=True)
+    return outcome
 
 
 def _make_whole(log_path: Path) -> None:

@@ -63,6 +63,7 @@ def command(
 
 def _table(state: LabState, now: float) -> Table:
     from rich.table import Table
+    from rich.text import Text
 
     from hil.live.lab_state import told_lines
 
@@ -70,5 +71,6 @@ def _table(state: LabState, now: float) -> Table:
     for title in ("what", "last, rate", "says"):
         table.add_column(title, overflow="fold")
     for row in told_lines(state, now):
-        table.add_row(*row)
+        # What is on the wire may look like markup.
+        table.add_row(*map(Text, row))
     return table

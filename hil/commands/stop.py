@@ -24,7 +24,7 @@ def command(
 ) -> None:
     """Stop everybody for REASON: controllers by a stop message, and robots by a command to stand.
 
-    Ends with 0 once all robots are told to stand and nobody tells one otherwise, else with 1.
+    Ends with 0 once all robots are told to stand, are heard of, and nobody tells one otherwise, else with 1.
     """
     from hil.live.lab_state import LabState, hear_for
     from hil.nodes.link_nodes import leader_standstill, standstill
@@ -39,7 +39,8 @@ def command(
     state, links = LabState(chosen), links_of(chosen)
     clock = time.monotonic
     with joined(endpoints_of(connect, None, zenoh_config), chosen, "stop", patience=3.0) as wire:
-        wire.subscribe(state.robots, shown=False)
+        # What we say ourselves comes back on any wire, also on one without robots.
+        wire.subscribe(state.robot_topics, shown=False, ours=False)
         for _ in range(_TIMES):
             wire.publish(topics.STOP, encode(String(data=reason)))
             now_ns = time.time_ns()
@@ -47,11 +48,18 @@ def command(
                 wire.publish(still.topic, still.payload)
             hear_for(state, wire.inbox.take, clock, clock() + _REPEAT_S)
         until = clock() + _PATIENCE_S
-        while (driven := state.driven(clock())) and clock() < until:
+        while ((driven := state.driven(clock())) or state.unheard()) and clock() < until:
             hear_for(state, wire.inbox.take, clock, clock() + _LOOK_S)
     if driven:
         click.echo(
             f"abreast stop: somebody still drives {', '.join(driven)}; use the robot's switch", err=True
+        )
+        sys.exit(1)
+    if unheard := state.unheard():
+        click.echo(
+            f"abreast stop: nothing was heard of {', '.join(unheard)} on this wire; "
+            "give --scenario FILE of your lab, and see that its bridge runs",
+            err=True,
         )
         sys.exit(1)
     click.echo(f"abreast stop: {', '.join(state.robots.values())} told to stand ({reason})", err=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from formation.pose import STANDSTILL, Motion
+from hil.live.reported_number import reported_number
 from hil.nodes.findings import PREFIX, findings_in, findings_json
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
@@ -45,7 +46,10 @@ class Heard:
 
 
 class LabState:
-    """The newest of everything that is heard, by the topics of a scenario."""
+    """The newest of everything that is heard, by the topics of a scenario.
+
+    ``robots``: their names by the topics that tell them to drive; ``robot_topics``: these and their odometry.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
         robots = robots_of(scenario)
@@ -53,13 +57,13 @@ class LabState:
         self.robots = {each.cmd_vel: each.name for each in robots}
         self._wheels = {each.name: each.odom for each in robots}
         self.wanted = tuple(each.body for each in robots)
+        self.robot_topics = (*self.robots, *self._wheels.values())
         self.topics = (
             topics.DIAGNOSTICS,
             topics.STOP,
             topics.RIGID_BODIES,
             *source_topics(scenario),
-            *self.robots,
-            *self._wheels.values(),
+            *self.robot_topics,
         )
         self._heard: dict[str, Heard] = {}
         self._bodies: dict[str, Heard] = {}
@@ -84,9 +88,11 @@ class LabState:
             elif event.topic == topics.STOP:
                 self.stops = [*self.stops[-9:], decode_as(event.payload, msg.String).data]
             elif event.topic in self.robots:
+                self._driven_at[event.topic], before = now, self._driven_at.get(event.topic, -math.inf)
+                # Only what can be read says that a robot is to stand: its driver may take another type.
                 drive = self.drives[event.topic] = self._drive(event.payload)
-                if drive != STANDSTILL:
-                    self._driven_at[event.topic] = now
+                if drive == STANDSTILL:
+                    self._driven_at[event.topic] = before
         except MalformedPayloadError:
             self.malformed += 1
 
@@ -96,11 +102,19 @@ class LabState:
         return Motion(twist.linear.x, twist.angular.z)
 
     def driven(self, now: float) -> list[str]:
-        """Robots that were told nothing, or of late to drive: several may tell them in turn."""
+        """Robots that were told of late to drive: several may tell them in turn."""
         return [
             name
             for topic, name in self.robots.items()
-            if topic not in self.drives or now - self._driven_at.get(topic, -math.inf) < _QUIET_S
+            if now - self._driven_at.get(topic, -math.inf) < _QUIET_S
+        ]
+
+    def unheard(self) -> list[str]:
+        """Robots of which nothing was heard: no odometry, and nobody tells them anything."""
+        return [
+            name
+            for topic, name in self.robots.items()
+            if topic not in self._heard and self._wheels[name] not in self._heard
         ]
 
     def as_dict(self, now: float) -> dict[str, Any]:
@@ -121,9 +135,9 @@ class LabState:
         heard, status = self._daemons[name]
         values = {each.key: each.value for each in status.values if not each.key.startswith(PREFIX)}
         refused = {
-            key.removeprefix(_REFUSED): int(value)
+            key.removeprefix(_REFUSED): count
             for key, value in values.items()
-            if key.startswith(_REFUSED) and value.isdigit()
+            if key.startswith(_REFUSED) and (count := reported_number(value)) is not None
         }
         report = msg.DiagnosticArray(header=_NO_HEADER, status=[status])
         (found,) = findings_in(report).values()

@@ -23,6 +23,7 @@ from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.key_layout import layout_of
+from hil.wire.lab_robots import robots_of
 from hil.wire.messages import encode
 from hil.wire.pubsub import Wire
 from hil.wire.session import Endpoints, close_session, open_session
@@ -37,17 +38,23 @@ FIRST_WORD_TIMEOUT = 900.0
 SILENCE = 3.0
 STANDSTILL_TIMEOUT = 10.0
 _GLANCE = 0.05
+_LAST_BREATH = 1.0
+"""From the stop that a daemon says as it breaks down to its end [s]."""
 
 Show = Callable[[Snapshot, float | None], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a live run ended: what failed (empty: nothing), whether it was interrupted, how long it drove."""
+    """How a live run ended: what failed (empty: nothing), whether it was interrupted, how long it drove.
+
+    ``robots``: in words, what was seen of how the robots were left.
+    """
 
     failure: str
     interrupted: bool
     duration_s: float
+    robots: str
 
 
 def run_live(
@@ -88,10 +95,10 @@ class _Supervisor:
         self._nodes = [name for daemon in crew.daemons for name in node_names(daemon, self._links)]
         self._session = open_session(joining)
         self._wire = Wire(self._session, urgent_topics(scenario), layout_of(scenario), "run")
-        wheels = [pair.odom for pair in pairs] if crew.real else []
-        if crew.drives_leader:
-            wheels.append(pairs[0].leader_odom)
-        self._monitor = RunMonitor(self._session, pairs, layout_of(scenario), wheels)
+        self._robots = robots_of(scenario)
+        watched = self._robots[0 if crew.drives_leader else 1 :] if crew.real else ()
+        self._wheels = {each.odom: each.name for each in watched}
+        self._monitor = RunMonitor(self._session, pairs, layout_of(scenario), tuple(self._wheels))
         self._children = Children(log_path.parent)
         self._drivers: list[str] = []
         for name, daemon, followers in processes_of(self._links, crew.daemons):
@@ -113,10 +120,12 @@ class _Supervisor:
             now = time.monotonic()
             if set_off is None and snapshot.motion_since_ns is not None:
                 set_off = now - (time.time_ns() - snapshot.motion_since_ns) * 1e-9
+            if set_off is None and snapshot.stopped is not None:
+                failure = failure or self._stopped_early()
             if len(snapshot.heard) > known:
                 begun, known = now, len(snapshot.heard)
             patience = START_TIMEOUT if self._all_heard(snapshot) else FIRST_WORD_TIMEOUT
-            if set_off is None and now - begun > patience and not self._may_wait(snapshot):
+            if set_off is None and not failure and now - begun > patience and not self._may_wait(snapshot):
                 failure = (
                     f"the start barrier did not open within {patience:g} s: "
                     f"{snapshot.waits_for(self._nodes) or 'no daemon says why'}"
@@ -125,8 +134,12 @@ class _Supervisor:
             if set_off is not None and now - set_off >= duration:
                 break
         driven = 0.0 if set_off is None else min(time.monotonic() - set_off, duration)
-        self._stop(failure or ("interrupted" if ending.asked else "end of run"))
-        return Outcome(failure, ending.asked, driven)
+        moving = self._stop(failure or ("interrupted" if ending.asked else "end of run"))
+        if moving:
+            unseen = f"{', '.join(moving)} {'have' if len(moving) > 1 else 'has'} not been seen to stand"
+            unseen += f" within {STANDSTILL_TIMEOUT:g} s; use {'their' if len(moving) > 1 else 'its'} switch"
+            failure = f"{failure}; {unseen}" if failure else unseen
+        return Outcome(failure, ending.asked, driven, self._how_left())
 
     def close(self) -> None:
         """Who drives robots first, its last word being a standstill; recorder last, to miss nothing."""
@@ -156,17 +169,48 @@ class _Supervisor:
         silent = self._monitor.snapshot.silent(self._nodes, SILENCE)
         return f"the {silent} has said nothing for {SILENCE:g} s" if silent else ""
 
-    def _stop(self, reason: str) -> None:
-        """Stop everybody, speak for drivers that may be gone, and wait until the robots stand."""
+    def _stopped_early(self) -> str:
+        """That somebody stopped everybody before the leader set off, unless it has set off after all.
+
+        A daemon that breaks down says stop with its last breath: then its end is what is wrong.
+        """
+        failure, snapshot = self._failure(_LAST_BREATH), self._monitor.update()
+        if failure or snapshot.motion_since_ns is not None:
+            return failure
+        return f"stopped before the leader set off: {snapshot.stopped}"
+
+    def _stop(self, reason: str) -> list[str]:
+        """Stop everybody, speak for drivers that may be gone, and wait until the robots stand.
+
+        Returns the real robots that have told how they move, and not that they stand since.
+        """
+        snapshot = self._monitor.update()
+        heard = set(snapshot.wheels)
+        # A robot whose link is gone has said what it said before the stop.
+        snapshot.wheels.clear()
         self._wire.publish(topics.STOP, encode(msg.String(data=reason)))
         self._tell_to_stand()
         deadline = time.monotonic() + STANDSTILL_TIMEOUT
-        while time.monotonic() < deadline and self._somebody_moves():
+        while time.monotonic() < deadline and self._somebody_moves(heard):
             time.sleep(_GLANCE)
             if self._crew.real:
                 # What real robots hear may be lost on the way.
                 self._tell_to_stand()
         time.sleep(_GLANCE)
+        snapshot = self._monitor.update()
+        heard |= snapshot.wheels.keys()
+        return [
+            name for wheels, name in self._wheels.items() if wheels in heard and not snapshot.stands(wheels)
+        ]
+
+    def _how_left(self) -> str:
+        """How the robots were left, in words: what is not known of each that it stands is not said."""
+        snapshot = self._monitor.snapshot
+        standing = [name for wheels, name in self._wheels.items() if snapshot.stands(wheels)]
+        if len(standing) == len(self._robots) or (not self._crew.real and snapshot.standing):
+            return "the robots stand"
+        told = "the robots were told to stand"
+        return f"{told}, {', '.join(standing)} seen to" if standing else told
 
     def _tell_to_stand(self) -> None:
         still = [standstill(link, time.time_ns()) for link in self._links]
@@ -175,9 +219,12 @@ class _Supervisor:
         for message in still:
             self._wire.publish(message.topic, message.payload)
 
-    def _somebody_moves(self) -> bool:
-        """Whether a robot that was seen has yet to stand; without the emulator no emulated one ever will."""
+    def _somebody_moves(self, heard: set[str]) -> bool:
+        """Whether a robot that was seen has yet to stand; without the emulator no emulated one ever will.
+
+        ``heard``: the topics of odometry that was heard before the stop.
+        """
         snapshot = self._monitor.update()
-        if snapshot.wheels:
-            return not snapshot.wheels_stand
+        if wheels := heard | snapshot.wheels.keys():
+            return not all(map(snapshot.stands, wheels))
         return bool(snapshot.truths) and not snapshot.standing and self._children.running("emulator")

@@ -12,7 +12,9 @@ import zenoh
 
 from estimation.tracking.tracker import Status
 from formation.pose import Motion
+from hil.live.reported_number import reported_number
 from hil.nodes.findings import Findings, findings_in
+from hil.nodes.leader_driver import stop_reason
 from hil.scenario.links import STARTERS
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -35,7 +37,7 @@ class Snapshot:
 
     ``followers``: their names from the leader on. ``observed_s``: for how long we have looked. ``heard``: at
     which ``observed_s`` each node last reported, ``problems``: what it said, ``findings``: what it found.
-    ``wheels``: what real robots say of their own motion, by topic.
+    ``wheels``: what real robots say of their own motion, by topic. ``stopped``: by what stop.
     """
 
     followers: tuple[str, ...] = ()
@@ -44,6 +46,7 @@ class Snapshot:
     problems: dict[str, str] = field(default_factory=dict)
     findings: dict[str, Findings] = field(default_factory=dict)
     motion_since_ns: int | None = None
+    stopped: str | None = None
     estimates: dict[str, msg.LeaderEstimate] = field(default_factory=dict)
     certified: dict[str, msg.CertifiedEstimate] = field(default_factory=dict)
     commands: dict[str, msg.Command] = field(default_factory=dict)
@@ -59,10 +62,10 @@ class Snapshot:
             for truth in truths
         )
 
-    @property
-    def wheels_stand(self) -> bool:
-        """Whether all real robots stand that were heard of."""
-        return all(abs(each.v) < _STILL_V and abs(each.u) < _STILL_U for each in self.wheels.values())
+    def stands(self, wheels: str) -> bool:
+        """Whether a real robot says that it stands, by the topic of its odometry."""
+        motion = self.wheels.get(wheels)
+        return motion is not None and abs(motion.v) < _STILL_V and abs(motion.u) < _STILL_U
 
     def waits_for(self, names: Iterable[str]) -> str:
         """What the start waits for, in words, empty for nothing that anybody tells.
@@ -73,7 +76,9 @@ class Snapshot:
         if unheard:
             patience = " yet; a first start compiles for minutes" if self.observed_s > _COMPILES_S else ""
             return f"nothing was heard of {', '.join(unheard)}{patience}"
-        return "; ".join(f"{name}: {problem}" for name, problem in self.problems.items() if problem)
+        # A copy: Zenoh's thread may add to it meanwhile.
+        said = list(self.problems.items())
+        return "; ".join(f"{name}: {problem}" for name, problem in said if problem)
 
     def silent(self, names: Iterable[str], patience: float) -> str | None:
         """A node that has reported before but not in the last ``patience`` [s]."""
@@ -127,7 +132,7 @@ class RunMonitor:
         self._diagnostics = session.declare_subscriber(layout.heard(topics.DIAGNOSTICS), self._on_diagnostics)
         self._newest = {
             topic: session.declare_subscriber(layout.heard(topic), zenoh.handlers.RingChannel(1))
-            for topic in (*wheels, *(topic for pair in pairs for topic in _told_of(pair)))
+            for topic in (topics.STOP, *wheels, *(topic for pair in pairs for topic in _told_of(pair)))
         }
         self._pairs, self._wheels = pairs, wheels
 
@@ -141,6 +146,8 @@ class RunMonitor:
         snapshot, now = self.snapshot, time.monotonic()
         snapshot.advance(now - self._updated_at)
         self._updated_at = now
+        if topics.STOP in latest and snapshot.stopped is None:
+            snapshot.stopped = stop_reason(latest[topics.STOP])
         for pair in self._pairs:
             who = pair.follower
             if seen := _sound(latest, pair.estimate, msg.LeaderEstimate):
@@ -178,8 +185,10 @@ class RunMonitor:
             self.snapshot.heard[name] = self.snapshot.observed_s
             self.snapshot.problems[name] = status.message if status.level else ""
             for value in status.values:
-                if name in STARTERS and value.key == "motion_since_ns" and value.value.isdecimal():
-                    self.snapshot.motion_since_ns = min(int(value.value), stamp_ns)
+                if name not in STARTERS or value.key != "motion_since_ns":
+                    continue
+                if (since_ns := reported_number(value.value)) is not None:
+                    self.snapshot.motion_since_ns = min(since_ns, stamp_ns)
 
 
 def _told_of(pair: Topics) -> tuple[str, ...]:

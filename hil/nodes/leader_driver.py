@@ -87,7 +87,7 @@ class LeaderDriver:
             self._hear(state, event)
             return state, ()
         if event.topic:
-            state.over = state.over or _reason(event.payload)
+            state.over = state.over or f"stopped: {stop_reason(event.payload)}"
         else:
             self._look(state, now_ns)
         out = (self._command(state, now_ns),)
@@ -107,8 +107,10 @@ class LeaderDriver:
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
 
     def _problem(self, state: DriverState, now_ns: int) -> str:
-        if state.since_ns is not None or state.over:
+        if state.since_ns is not None:
             return ""
+        if state.over:
+            return state.over
         if state.counting_ns is None:
             return self.barrier.waits_for(state.present)
         return f"sets off in {max(0, state.counting_ns + self._countdown_ns - now_ns) * _NS:.1f} s"
@@ -160,9 +162,9 @@ class LeaderDriver:
         )
 
 
-def _reason(payload: bytes) -> str:
+def stop_reason(payload: bytes) -> str:
     """Why a stop was ordered; one that cannot be read counts too."""
     try:
-        return f"stopped: {decode_as(payload, msg.String).data}"
+        return decode_as(payload, msg.String).data
     except MalformedPayloadError:
-        return "stopped"
+        return "for a reason that cannot be read"

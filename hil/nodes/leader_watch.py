@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from hil.nodes.capture_time import captured_ns
-from hil.nodes.leader_driver import NAME
+from hil.nodes.leader_driver import NAME, stop_reason
 from hil.nodes.node import Counts, Outgoing, counted, diagnostics, is_due, named_counts, no_counts, outgoing
 from hil.nodes.start_barrier import NOBODY, Attendance, StartBarrier
 from hil.scenario.links import bodies_of, links_of
@@ -47,13 +47,15 @@ def seen_at(rest: Rest, x: float, y: float, at_ns: int, reach: float) -> Rest:
 class WatchState:
     """What the watch knows; it changes in place.
 
-    ``rest``: where the leader stood when all behind it were well; ``since_ns``: when it set off.
+    ``rest``: where the leader stood when all behind it were well; ``since_ns``: when it set off. ``over``: by
+    which stop all is over, empty before.
     """
 
     next_diagnostics_ns: int
     present: Attendance = NOBODY
     rest: Rest | None = None
     since_ns: int | None = None
+    over: str = ""
     refused: Counts = field(default_factory=no_counts)
 
 
@@ -67,7 +69,7 @@ class LeaderWatch:
         self._body = bodies_of(scenario)[0]
         self._reach = max(SET_OFF_M, 6.0 * scenario.estimator.sigma_position)
         self._estimator = scenario.estimator
-        self.subscribes = (*self.barrier.subscribes, topics.RIGID_BODIES)
+        self.subscribes = (*self.barrier.subscribes, topics.RIGID_BODIES, topics.STOP)
 
     def begin(self, now_ns: int) -> WatchState:
         """Nobody was heard of."""
@@ -78,10 +80,13 @@ class LeaderWatch:
         return state.next_diagnostics_ns
 
     def step(self, state: WatchState, event: Event, now_ns: int) -> tuple[WatchState, tuple[Outgoing, ...]]:
-        """Take in a report, a follower's command or a frame."""
+        """Take in a report, a follower's command, a frame or a stop, after which nobody sets off."""
         try:
             if event.topic == topics.RIGID_BODIES:
                 return state, self._on_frame(state, event.payload, now_ns)
+            if event.topic == topics.STOP:
+                state.over = state.over or f"stopped: {stop_reason(event.payload)}"
+                return state, ()
             if event.topic:
                 state.present = self.barrier.after(state.present, event)
                 return state, ()
@@ -94,19 +99,19 @@ class LeaderWatch:
         return state, (self.report(state, now_ns),)
 
     def report(self, state: WatchState, now_ns: int) -> Outgoing:
-        """Diagnostics: what is waited for, and since when the leader moves."""
-        values: dict[str, object] = {"driven": "hand"}
+        """Diagnostics: what is waited for, since when the leader moves, and by which stop all is over."""
+        values: dict[str, object] = {"driven": "hand", "over": state.over}
         if state.since_ns is not None:
             values["motion_since_ns"] = state.since_ns
         values |= named_counts("refused", state.refused)
         problem = ""
         if state.since_ns is None:
             ready = f"all is ready: drive {self._body!r} off by hand"
-            problem = self.barrier.waits_for(state.present) or ready
+            problem = state.over or self.barrier.waits_for(state.present) or ready
         return outgoing(topics.DIAGNOSTICS, diagnostics(self.name, now_ns, problem, values), now_ns)
 
     def _on_frame(self, state: WatchState, payload: bytes, now_ns: int) -> tuple[Outgoing, ...]:
-        if state.since_ns is not None:
+        if state.since_ns is not None or state.over:
             return ()
         if not self.barrier.is_open(state.present):
             state.rest = None

@@ -90,19 +90,21 @@ class Wire:
         if node:
             self._show(node_token(layout, str(session.zid()), self._node))
 
-    def subscribe(self, topics: Iterable[str], *, shown: bool = True) -> None:
-        """Let the payloads of the topics into the inbox. ``shown``: in the ROS graph.
+    def subscribe(self, topics: Iterable[str], *, shown: bool = True, ours: bool = True) -> None:
+        """Let the payloads of the topics into the inbox. ``shown``: in the ROS graph; ``ours``: our own too.
 
         Zenoh's own thread puts them there, not one for each topic, so that they lie in the order in which
         they came, over all topics. The callback must do nothing else: Zenoh itself would wait for it.
         """
+        origin = zenoh.Locality.ANY if ours else zenoh.Locality.REMOTE
         for topic in topics:
 
             def keep(sample: zenoh.Sample, topic: str = topic) -> None:
                 self.inbox.put(Event(topic, sample.payload.to_bytes()))
 
             direct = zenoh.handlers.Callback(keep, indirect=False)
-            self._subscribers.append(self._session.declare_subscriber(self._layout.heard(topic), direct))
+            key = self._layout.heard(topic)
+            self._subscribers.append(self._session.declare_subscriber(key, direct, allowed_origin=origin))
             if shown:
                 self._show_endpoint(topic, publishes=False)
 

@@ -13,6 +13,7 @@ import pytest
 from hil.command_line import COMMANDS, main
 from hil.errors import UsageError
 from hil.judge.run_data import run_data_of_log
+from hil.live.run import Outcome
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import Log, read_log
 from hil.reports.judged_log import claimed
@@ -160,14 +161,15 @@ def main_code(arguments: list[str]) -> object:
 def test_a_run_that_broke_down_says_so_even_without_room_for_a_verdict(
     tmp_path: Path, short_log: Log, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def broken(_scenario: Scenario, log_path: Path, _live: object) -> str:
+    def broken(_scenario: Scenario, log_path: Path, _live: object) -> Outcome:
         log_path.write_bytes(short_log.path.read_bytes())
-        return "the recorder ended"
+        return Outcome("the recorder ended", False, 0.0, "the robots were told to stand")
 
     monkeypatch.setattr("hil.commands.run._live", broken)
     (tmp_path / "summary.json").symlink_to("/dev/full")
     assert main_code(["run", "--out", str(tmp_path)]) == 1
-    assert "the run broke down: the recorder ended" in capsys.readouterr().err.splitlines()[-1]
+    told = "the run broke down: the recorder ended; the robots were told to stand, the log is"
+    assert told in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_times_of_a_recording_may_count_from_1970(capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,10 +5,13 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
 
-from formation.pose import Motion
+from formation.pose import STANDSTILL, Motion, Pose
+from hil.emulator.lab_messages import odometry_message
+from hil.nodes.node import diagnostics
 from hil.wire.drive_message import drive_message
 from hil.wire.message_types import String, TwistStamped
 from hil.wire.messages import decode_as, encode
@@ -23,6 +26,37 @@ def lab() -> Iterator[tuple[str, Wire]]:
         yield found
 
 
+@contextmanager
+def again(wire: Wire, *said: tuple[str, bytes]) -> Iterator[None]:
+    """Somebody who says all of this 50 times a second."""
+    over = threading.Event()
+
+    def say() -> None:
+        while not over.wait(0.02):
+            for topic, payload in said:
+                wire.publish(topic, payload)
+
+    saying = threading.Thread(target=say)
+    saying.start()
+    try:
+        yield
+    finally:
+        over.set()
+        saying.join()
+
+
+def odometry(robot: str) -> tuple[str, bytes]:
+    standing = odometry_message(5, robot, Pose(0.0, 0.0, 0.0), STANDSTILL)
+    return f"{robot}/odom", encode(standing)
+
+
+def drive(v: float, *, stamped: bool = True) -> bytes:
+    return encode(drive_message(Motion(v, 0.0), 5, "", stamped=stamped))
+
+
+ROBOTS = odometry("leader"), odometry("follower")
+
+
 def ran(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "hil", *arguments], capture_output=True, text=True, check=False
@@ -32,7 +66,8 @@ def ran(*arguments: str) -> subprocess.CompletedProcess[str]:
 def test_a_stop_reaches_everybody_with_its_reason(lab: tuple[str, Wire]) -> None:
     endpoint, wire = lab
     wire.subscribe(["stop", "leader/cmd_vel", "follower/cmd_vel"])
-    done = ran("stop", "enough of it", "--connect", endpoint)
+    with again(wire, *ROBOTS):
+        done = ran("stop", "enough of it", "--connect", endpoint)
     assert done.returncode == 0, done.stderr
     assert "leader, follower told to stand (enough of it)" in done.stderr
     heard: dict[str, bytes] = {}
@@ -42,23 +77,37 @@ def test_a_stop_reaches_everybody_with_its_reason(lab: tuple[str, Wire]) -> None
     assert decode_as(heard["stop"], String).data == "enough of it"
 
 
-def test_a_stop_says_who_is_driven_in_spite_of_it(lab: tuple[str, Wire]) -> None:
+@pytest.mark.parametrize(
+    "command", [drive(0.1), drive(0.0, stamped=False)], ids=["drives on", "in another type"]
+)
+def test_a_stop_says_who_is_driven_in_spite_of_it(lab: tuple[str, Wire], command: bytes) -> None:
     endpoint, wire = lab
-    over = threading.Event()
-
-    def drive_on() -> None:
-        while not over.wait(0.02):
-            wire.publish("follower/cmd_vel", encode(drive_message(Motion(0.1, 0.0), 5, "", stamped=True)))
-
-    stubborn = threading.Thread(target=drive_on)
-    stubborn.start()
-    try:
+    with again(wire, *ROBOTS, ("follower/cmd_vel", command)):
         done = ran("stop", "--connect", endpoint)
-    finally:
-        over.set()
-        stubborn.join()
     assert done.returncode == 1
     assert "somebody still drives follower" in done.stderr
+
+
+def test_a_stop_that_hears_only_itself_has_stopped_nobody(lab: tuple[str, Wire]) -> None:
+    endpoint, wire = lab
+    wire.subscribe(["stop", "follower/cmd_vel"])
+    done = ran("stop", "--connect", endpoint)
+    assert done.returncode == 1
+    assert "nothing was heard of leader, follower on this wire; give --scenario FILE" in done.stderr
+    assert done.stderr.count("\n") == 1
+    heard = {event.topic for event in iter(lambda: wire.inbox.take(0.2), None)}
+    assert heard == {"stop", "follower/cmd_vel"}
+
+
+def test_a_stop_names_the_robot_that_it_does_not_hear_of(lab: tuple[str, Wire]) -> None:
+    endpoint, wire = lab
+    with again(wire, odometry("leader")):
+        done = ran("stop", "--connect", endpoint)
+    assert done.returncode == 1
+    assert "nothing was heard of follower on this wire" in done.stderr
+    with again(wire, odometry("leader"), ("follower/cmd_vel", drive(0.0))):
+        done = ran("stop", "--connect", endpoint)
+    assert done.returncode == 0, done.stderr
 
 
 def test_status_tells_what_passes_as_json(lab: tuple[str, Wire]) -> None:
@@ -69,6 +118,17 @@ def test_status_tells_what_passes_as_json(lab: tuple[str, Wire]) -> None:
     assert (told["daemons"], told["missing_bodies"]) == ([], ["leader", "follower"])
     shown = ran("status", "--once", "--connect", endpoint)
     assert "not seen" in shown.stdout
+
+
+def test_status_shows_what_looks_like_markup_as_it_is(lab: tuple[str, Wire]) -> None:
+    endpoint, wire = lab
+    report = diagnostics("estimator[0]", 5, "[/lab] waits for [source]", {"refused.[b]": 7, "refused.c": "²"})
+    with again(wire, ("diagnostics", encode(report))):
+        shown = ran("status", "--once", "--connect", endpoint)
+    assert shown.returncode == 0, shown.stderr
+    text = " ".join(shown.stdout.split())
+    for part in ("estimator[0]", "[/lab] waits for [source]", "refused: 7 [b]"):
+        assert part in text
 
 
 @pytest.mark.parametrize("command", ["status", "stop"])

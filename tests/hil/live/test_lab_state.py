@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from formation.pose import Motion, Pose
-from hil.emulator.lab_messages import frame_message
+from hil.emulator.lab_messages import frame_message, odometry_message
 from hil.live.lab_state import LabState, told_lines
 from hil.nodes.findings import named_findings
 from hil.nodes.node import diagnostics
@@ -58,12 +58,36 @@ def test_bodies_daemons_and_robots_are_told_with_their_ages() -> None:
 
 def test_a_robot_is_driven_until_nobody_has_told_it_to_move_for_a_moment() -> None:
     state = LabState(SCENARIO)
-    assert state.driven(0.0) == ["leader", "follower"]
+    assert state.driven(0.0) == []
     told(state, "leader/cmd_vel", drive(0.0), 0.0)
     told(state, "follower/cmd_vel", drive(0.1), 1.0)
     told(state, "follower/cmd_vel", drive(0.0), 1.01)
     assert state.driven(1.1) == ["follower"]
     assert state.driven(1.3) == []
+
+
+def test_a_robot_is_driven_by_what_cannot_be_read_too() -> None:
+    state = LabState(SCENARIO)
+    told(state, "follower/cmd_vel", drive(0.0), 1.0)
+    state.hear(Event("follower/cmd_vel", encode(drive_message(Motion(0.0, 0.0), 5, "", stamped=False))), 1.01)
+    assert (state.driven(1.1), state.driven(1.3)) == (["follower"], [])
+
+
+def test_a_robot_is_heard_of_by_its_odometry_or_by_what_it_is_told() -> None:
+    state = LabState(SCENARIO)
+    assert state.unheard() == ["leader", "follower"]
+    told(state, "leader/odom", odometry_message(5, "leader", Pose(0.0, 0.0, 0.0), Motion(0.0, 0.0)), 1.0)
+    assert state.unheard() == ["follower"]
+    told(state, "follower/cmd_vel", drive(0.0), 1.0)
+    assert state.unheard() == []
+
+
+def test_a_count_that_is_no_number_is_not_one() -> None:
+    state = LabState(SCENARIO)
+    refused = {"refused.tilted": 7, "refused.late": "²", "refused.lost": "7" * 5000}
+    told(state, topics.DIAGNOSTICS, diagnostics("estimator", 5, "", refused), 1.0)
+    (estimator,) = state.as_dict(1.0)["daemons"]
+    assert estimator["refused"] == {"tilted": 7}
 
 
 def test_a_robot_that_takes_no_stamps_is_read_too() -> None:

@@ -93,3 +93,40 @@ def test_what_nodes_find_is_known_as_long_as_they_do() -> None:
     finally:
         monitor.close()
         close_session(session)
+
+
+def test_a_time_of_the_start_that_is_no_number_is_none() -> None:
+    with reserved_endpoint() as endpoint:
+        session = open_session(Endpoints(listen=endpoint))
+    monitor = RunMonitor(session, [PAIR])
+    deadline = time.monotonic() + 60.0
+    try:
+        for said in ("7" * 5000, "7" * 20, "²", "-7"):
+            values = {"motion_since_ns": said}
+            session.put(DIAGNOSTICS, encode(diagnostics("leader", 9, said[:2], values)))
+        session.put(DIAGNOSTICS, encode(diagnostics("emulator", 9, "", {})))
+        while "emulator" not in monitor.update().heard and time.monotonic() < deadline:
+            time.sleep(0.005)
+        assert monitor.snapshot.motion_since_ns is None
+        session.put(DIAGNOSTICS, encode(diagnostics("leader", 9, "", {"motion_since_ns": 7})))
+        while monitor.update().motion_since_ns is None and time.monotonic() < deadline:
+            time.sleep(0.005)
+        assert monitor.snapshot.motion_since_ns == 7
+    finally:
+        monitor.close()
+        close_session(session)
+
+
+def test_a_node_may_report_while_it_is_said_what_the_start_waits_for() -> None:
+    snapshot = Snapshot()
+
+    class Meanwhile(str):
+        """A problem that another node reports beside while this one is read."""
+
+        def __bool__(self) -> bool:
+            snapshot.problems["controller"] = "waiting for an estimate"
+            return True
+
+    snapshot.problems["estimator"] = Meanwhile("waiting for mocap")
+    assert snapshot.waits_for(()) == "estimator: waiting for mocap"
+    assert snapshot.waits_for(()) == "estimator: waiting for mocap; controller: waiting for an estimate"

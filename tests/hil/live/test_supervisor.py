@@ -55,7 +55,9 @@ def stopped(monkeypatch: pytest.MonkeyPatch) -> Callable[[Lab], float]:
     def stop(lab: Lab) -> float:
         monkeypatch.setattr(run, "time", lab)
         supervisor = object.__new__(_Supervisor)
-        supervisor.__dict__.update(_wire=lab, _monitor=lab, _children=lab, _links=LINKS, _crew=Crew())
+        supervisor.__dict__.update(
+            _wire=lab, _monitor=lab, _children=lab, _links=LINKS, _crew=Crew(), _wheels={}
+        )
         supervisor._stop("enough")
         return lab.now
 

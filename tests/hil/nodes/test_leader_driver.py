@@ -111,6 +111,13 @@ def test_a_stop_ends_it_at_once_and_for_good() -> None:
     assert state.over == "stopped: enough"
 
 
+def test_a_leader_that_was_stopped_before_it_set_off_says_so() -> None:
+    state, sent = driven([*READY, *WELL, (0.5, STOP)], 6.0)
+    assert state.since_ns is None
+    assert {motion for _, motion in sent} == {Motion(0.0, 0.0)}
+    assert problem(state) == "stopped: enough"
+
+
 def test_it_ends_with_the_run() -> None:
     state, sent = driven([*READY, *WELL], 12.0)
     assert state.over == "the program is over"

@@ -15,7 +15,7 @@ from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.events import TICK, Event
 from hil.wire.messages import decode_as, encode
-from tests.hil.nodes.test_leader_driver import BEGIN_NS, READY
+from tests.hil.nodes.test_leader_driver import BEGIN_NS, READY, STOP
 
 FRAME_NS = 8_333_333
 SCENARIO = load_scenario("turtlebot3", ["leader.body=7"])
@@ -89,6 +89,16 @@ def test_other_bodies_and_garbage_start_nobody() -> None:
         state, _ = NODE.step(state, Event(topics.RIGID_BODIES, b"\x01"), BEGIN_NS + k * FRAME_NS)
     assert state.since_ns is None
     assert state.refused == {"malformed": 20}
+
+
+@pytest.mark.parametrize("payload", [STOP.payload, b""])
+def test_after_a_stop_nobody_sets_off(payload: bytes) -> None:
+    assert topics.STOP in NODE.subscribes
+    state, _ = NODE.step(ready(), Event(topics.STOP, payload), BEGIN_NS)
+    state, _ = NODE.step(state, Event(topics.STOP, encode(msg.String(data="later"))), BEGIN_NS)
+    state, _ = shown(state, 0.0, 0.1, 0.2, 0.3, 0.4)
+    assert state.since_ns is None
+    assert problem(state) == ("stopped: enough" if payload else "stopped: for a reason that cannot be read")
 
 
 def test_it_drives_nobody() -> None:
