@@ -137,7 +137,7 @@ def _say(line: str) -> None:
 
 def _place(endpoint: str) -> tuple[int, str]:
     host, _, port = endpoint.partition("/")[2].rpartition(":")
-    return int(port) if port.isdigit() else 0, host.strip("[]")
+    return int(port) if port.isdecimal() else 0, host.strip("[]")
 
 
 def _show(checks: list[Check]) -> None:
