@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import json
-import signal
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -101,34 +98,17 @@ def _visited(
                 if hindrance is not None:
                     driven = [hindrance]
                 else:
-                    with _interrupted_by_signals():
+                    visit.ending.on_signals()
+                    try:
                         driven = examination.drive(robot, visit.tell)
+                    finally:
+                        visit.ending.leave_signals()
             now_ns = time.time_ns()
             findings += examination.findings(now_ns)
             yield from examination.checks(wire.graph(), layout_of(scenario), now_ns)
             yield from driven
     except NoRouterError as error:
         yield route_check(endpoints.describe(), str(error))
-
-
-@contextmanager
-def _interrupted_by_signals() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP (the terminal is gone) end what is done as Ctrl-C does: a robot drives by it."""
-
-    def interrupt(_number: int, _frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    ended_by = (signal.SIGTERM, signal.SIGHUP)
-    # Who was started with nohup is to outlive its terminal.
-    before = {each: signal.getsignal(each) for each in ended_by}
-    for each, handler in before.items():
-        if handler != signal.SIG_IGN:
-            signal.signal(each, interrupt)
-    try:
-        yield
-    finally:
-        for each, handler in before.items():
-            signal.signal(each, handler)
 
 
 def _say(line: str) -> None:

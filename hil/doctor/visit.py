@@ -9,6 +9,7 @@ from formation.pose import STANDSTILL, Motion
 from hil.doctor.drive_checks import CREEP, CREEP_S, REST_S, TURN, TURN_S, Span
 from hil.doctor.examination import Examination
 from hil.errors import AbreastError
+from hil.live.daemon import Ending
 from hil.scenario.schema import Scenario
 from hil.wire.drive_message import drive_message
 from hil.wire.lab_robots import LabRobot
@@ -21,16 +22,17 @@ _TICK_S = 0.02
 
 
 class StoppedError(AbreastError):
-    """Somebody said stop while a robot was driven."""
+    """Somebody said stop, or the doctor was ended, while a robot was driven."""
 
 
 class Visit:
-    """An examination of what comes by a wire."""
+    """An examination of what comes by a wire. ``ending``: asked to end, it drives nobody on."""
 
     def __init__(self, scenario: Scenario, wire: Wire) -> None:
         self.examination = Examination(scenario, time.time_ns())
         self._stamped = scenario.controller.command_type == "TwistStamped"
         self._wire, self._stop = wire, b""
+        self.ending = Ending()
         wire.subscribe((*self.examination.subscribes, STOP), shown=False)
         wire.watch_graph()
 
@@ -58,13 +60,14 @@ class Visit:
     def tell(self, robot: LabRobot, motion: Motion, seconds: float) -> Span:
         """Tell a robot to move for a while; the span of time of it, from when it had time to get going.
 
-        Raises :class:`StoppedError` where it is to move and somebody says stop meanwhile.
+        Raises :class:`StoppedError` where it is to move and somebody says stop, or asks for the end.
         """
         begun_ns, until = time.time_ns(), time.monotonic() + seconds
         frame = robot.cmd_vel.rpartition("/")[0]
         while time.monotonic() < until:
-            if self._stop and motion != STANDSTILL:
-                raise StoppedError(f"{robot.name} stands: somebody said stop ({_reason(self._stop)})")
+            if motion != STANDSTILL and (self._stop or self.ending.asked):
+                why = f"somebody said stop ({_reason(self._stop)})" if self._stop else "the doctor was ended"
+                raise StoppedError(f"{robot.name} stands: {why}")
             told = drive_message(motion, time.time_ns(), frame, stamped=self._stamped)
             self._wire.publish(robot.cmd_vel, encode(told))
             self.listen(_TICK_S)

@@ -34,11 +34,12 @@ def test_a_doctor_that_is_ended_leaves_the_robot_standing(by: signal.Signals) ->
             told.append(decode_as(event.payload, TwistStamped).twist.linear.x)
             if len(told) == 5:
                 doctor.send_signal(by)
-                doctor.communicate(timeout=PATIENCE)
+                _, said = doctor.communicate(timeout=PATIENCE)
     assert told[0] == 0.05
     assert told[-1] == 0.0
     assert told.count(0.05) < 60
-    assert doctor.returncode != 0
+    assert doctor.returncode == 1
+    assert "follower stands: the doctor was ended" in said
 
 
 def test_who_begins_to_command_while_it_counts_down_keeps_the_robot() -> None:
