@@ -129,13 +129,9 @@ def fitted_rates(
 
 def _fitted(times: FloatArray, poses: FloatArray, fit: LocalFit) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Grid from 0 on, and the fit on it; all empty for a track that is too short."""
-    grid = np.arange(0.0, times[-1] if len(times) else 0.0, fit.step)
-    length = 2 * round(0.5 * fit.window / fit.step) + 1 if len(grid) else 1
-    if len(grid) < length:
-        return np.empty(0), np.empty((0, 3)), np.empty((0, 3))
-    free = poses.copy()
-    free[:, 2] = np.unwrap(poses[:, 2])
-    even = _even(grid, times, free)
+    grid, even, length = _even(times, poses, fit)
+    if not len(grid):
+        return grid, even, even
     place = savgol_filter(even, length, DEGREE, axis=0)
     rate = savgol_filter(even, length, DEGREE, deriv=1, delta=fit.step, axis=0)
     return grid, place, rate
@@ -143,15 +139,25 @@ def _fitted(times: FloatArray, poses: FloatArray, fit: LocalFit) -> tuple[FloatA
 
 def _mean_velocity(times: FloatArray, poses: FloatArray, fit: LocalFit) -> FloatArray:
     """Slopes (m, 2) of straight lines through the windows on the grid: no velocity counts negative there."""
+    grid, even, length = _even(times, poses, fit)
+    if not len(grid):
+        return even[:, :2]
+    return savgol_filter(even[:, :2], length, 1, deriv=1, delta=fit.step, axis=0)
+
+
+def _even(times: FloatArray, poses: FloatArray, fit: LocalFit) -> tuple[FloatArray, FloatArray, int]:
+    """Grid from 0 on, the track on it with headings unwrapped, and the window's length in steps.
+
+    Grid and track are empty for a track that is shorter than the window.
+    """
     grid = np.arange(0.0, times[-1] if len(times) else 0.0, fit.step)
-    length = 2 * round(0.5 * fit.window / fit.step) + 1
+    # A track without duration may come with steps of no length.
+    length = 2 * round(0.5 * fit.window / fit.step) + 1 if len(grid) else 1
     if len(grid) < length:
-        return np.empty((0, 2))
-    return savgol_filter(_even(grid, times, poses[:, :2]), length, 1, deriv=1, delta=fit.step, axis=0)
-
-
-def _even(grid: FloatArray, times: FloatArray, columns: FloatArray) -> FloatArray:
-    return np.column_stack([np.interp(grid, times, column) for column in columns.T])
+        return np.empty(0), np.empty((0, 3)), length
+    free = poses.copy()
+    free[:, 2] = np.unwrap(poses[:, 2])
+    return grid, np.column_stack([np.interp(grid, times, column) for column in free.T]), length
 
 
 def poses_at(stamps_ns: NDArray[np.int64], poses: FloatArray, moments_ns: NDArray[np.int64]) -> FloatArray:

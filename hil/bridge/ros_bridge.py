@@ -59,7 +59,6 @@ class RosBridge:
         say: Callable[[str], None],
     ) -> None:
         self._wire, self._routes = wire, routes
-        self._driven = [route for route in routes if route.drives]
         self._types = {route.topic: route.typename for route in routes}
         self._two_way = frozenset(route.topic for route in routes if route.way == "both")
         self._echoes: dict[bytes, float] = {}
@@ -104,13 +103,16 @@ class RosBridge:
         self._pump.join()
         while (event := self._wire.inbox.take(0.0)) is not None:
             self._carry(event)
-        for route in self._driven:
-            if self._carried[route.topic]:
+        for route in self._routes:
+            if route.drives and self._carried[route.topic]:
                 stamped = route.typename.endswith("Stamped")
                 frame = route.topic.rpartition("/")[0]
                 still = drive_message(STANDSTILL, time.time_ns(), frame, stamped=stamped)
                 self._carry(Event(route.topic, encode(still)))
-        self._graph.spin(_LINGER_S)
+        # What is on its way is lost with who sent it; odometry that comes meanwhile would cut one wait short.
+        until = time.monotonic() + _LINGER_S
+        while (left := until - time.monotonic()) > 0.0:
+            self._graph.spin(left)
         self._graph.close()
 
     def _hear(self, topic: str, payload: bytes) -> None:

@@ -10,11 +10,11 @@ from hil.doctor.drive_checks import CREEP, CREEP_S, REST_S, TURN, TURN_S, Span
 from hil.doctor.examination import Examination
 from hil.errors import AbreastError
 from hil.live.daemon import Ending
+from hil.nodes.leader_driver import stop_reason
 from hil.scenario.schema import Scenario
 from hil.wire.drive_message import drive_message
 from hil.wire.lab_robots import LabRobot
-from hil.wire.message_types import String
-from hil.wire.messages import MalformedPayloadError, decode_as, encode
+from hil.wire.messages import encode
 from hil.wire.pubsub import Wire
 from hil.wire.topics import STOP
 
@@ -66,16 +66,13 @@ class Visit:
         frame = robot.cmd_vel.rpartition("/")[0]
         while time.monotonic() < until:
             if motion != STANDSTILL and (self._stop or self.ending.asked):
-                why = f"somebody said stop ({_reason(self._stop)})" if self._stop else "the doctor was ended"
+                why = (
+                    f"somebody said stop ({stop_reason(self._stop)})"
+                    if self._stop
+                    else "the doctor was ended"
+                )
                 raise StoppedError(f"{robot.name} stands: {why}")
             told = drive_message(motion, time.time_ns(), frame, stamped=self._stamped)
             self._wire.publish(robot.cmd_vel, encode(told))
             self.listen(_TICK_S)
         return begun_ns + round(REST_S * 1e9), time.time_ns()
-
-
-def _reason(stop: bytes) -> str:
-    try:
-        return decode_as(stop, String).data
-    except MalformedPayloadError:
-        return "unreadable"
