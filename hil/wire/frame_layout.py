@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from formation.byte_access import read_uint32, write_int32
 from formation.kernel import kernel
-from formation.records import Buffer, Indices, Rows, load, read_uint32, size, store, write_int32
+from formation.records import Buffer, Indices, Rows, load, size, store
 from hil.wire.cdr import (
     HEAD_BYTES,
     PLACEMENT_BYTES,
