@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import queue
-import struct
 import threading
-import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -16,6 +13,7 @@ import zenoh
 from hil.scenario.schema import Scenario
 from hil.wire.events import TICK, Event
 from hil.wire.key_layout import OURS, KeyLayout, layout_of
+from hil.wire.outlet import Outlet, gid_of, origin_of
 from hil.wire.ros_tokens import Endpoint, all_tokens, endpoint_in, endpoint_token, node_token
 from hil.wire.session import Endpoints, close_session, open_session
 from hil.wire.topics import STOP, urgent_topics
@@ -46,28 +44,6 @@ class Inbox:
             return None
 
 
-@dataclass(slots=True)
-class _Outlet:
-    """A publisher; ``gid``: what rmw_zenoh knows it by, empty where nobody asks; ``sent``: how many."""
-
-    publisher: zenoh.Publisher
-    gid: bytes
-    sent: int = 0
-
-    def put(self, payload: bytes) -> None:
-        if not self.gid:
-            self.publisher.put(payload)
-            return
-        self.sent += 1
-        # Without number, time and sender rmw_zenoh drops what it gets.
-        self.publisher.put(payload, attachment=attachment(self.sent, time.time_ns(), self.gid))
-
-
-def attachment(number: int, stamp_ns: int, gid: bytes) -> bytes:
-    """What rmw_zenoh has with every message: its number from 1 on, its time, and 16 bytes of its sender."""
-    return struct.pack("<qqB16s", number, stamp_ns, len(gid), gid)
-
-
 class Wire:
     """Subscriptions into one inbox, and publishers that are declared when first used.
 
@@ -81,7 +57,7 @@ class Wire:
         self.inbox = Inbox()
         self._session = session
         self._urgent, self._layout = frozenset(urgent), layout
-        self._outlets: dict[str, _Outlet] = {}
+        self._outlets: dict[str, Outlet] = {}
         self._subscribers: list[zenoh.Subscriber[None]] = []
         self._tokens: list[zenoh.LivelinessToken] = []
         self._graph: dict[str, Endpoint] = {}
@@ -100,7 +76,7 @@ class Wire:
         for topic in topics:
 
             def keep(sample: zenoh.Sample, topic: str = topic) -> None:
-                self.inbox.put(Event(topic, sample.payload.to_bytes()))
+                self.inbox.put(Event(topic, sample.payload.to_bytes(), origin_of(sample)))
 
             direct = zenoh.handlers.Callback(keep, indirect=False)
             key = self._layout.heard(topic)
@@ -155,13 +131,13 @@ class Wire:
         self._subscribers.clear()
         self._outlets.clear()
 
-    def _declare(self, topic: str) -> _Outlet:
+    def _declare(self, topic: str) -> Outlet:
         with self._lock:
             if (declared := self._outlets.get(topic)) is not None:
                 return declared
             return self._declared(topic)
 
-    def _declared(self, topic: str) -> _Outlet:
+    def _declared(self, topic: str) -> Outlet:
         urgent = topic in self._urgent
         must_arrive = topic == STOP
         congestion = zenoh.CongestionControl.BLOCK if must_arrive else zenoh.CongestionControl.DROP
@@ -176,8 +152,7 @@ class Wire:
         )
         token = self._show_endpoint(topic, publishes=True)
         told = token or f"{self._session.zid()}/{key}"
-        gid = hashlib.blake2b(told.encode(), digest_size=16).digest()
-        outlet = _Outlet(publisher, gid if self._layout.kind == "rmw_zenoh" else b"")
+        outlet = Outlet(publisher, gid_of(told) if self._layout.kind == "rmw_zenoh" else b"")
         self._outlets[topic] = outlet
         return outlet
 
