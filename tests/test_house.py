@@ -33,7 +33,7 @@ ROOMS = {
         "models", "own_motion", "time", "filters", "tracking", "bounds", "consistency", "calibration",
     ),
     "hil": (
-        "extensions", "scenario", "wire", "log", "nodes", "emulator", "lockstep", "live", "bridge", "doctor",
+        "extensions", "scenario", "wire", "guard", "log", "nodes", "emulator", "lockstep", "live", "bridge", "doctor",
         "replay",
         "recordings", "judge", "figures", "reports", "sweep", "simulate", "commands",
     ),

@@ -10,6 +10,10 @@ from typing import NamedTuple
 _SIGN, _TWICE_SIGN = 1 << 63, 1 << 64
 
 
+NUMBERS = 1 << 32
+"""So many numbers a publisher has for what it sends, and begins anew after that."""
+
+
 class Origin(NamedTuple):
     """Who sent a payload: a Zenoh session and one of its publishers, which numbers what it sends."""
 
@@ -21,6 +25,14 @@ class Origin(NamedTuple):
     def sender(self) -> str:
         """Session and publisher, without the number."""
         return f"{self.session}/{self.publisher}"
+
+    def is_after(self, other: Origin) -> bool:
+        """Whether this is later than another payload of the same sender.
+
+        >>> Origin("7f", 1, 5).is_after(Origin("7f", 1, 4))
+        True
+        """
+        return 0 < (self.number - other.number) % NUMBERS < NUMBERS // 2
 
 
 @dataclass(slots=True, unsafe_hash=True)

@@ -9,9 +9,7 @@ from dataclasses import dataclass
 
 import zenoh
 
-from hil.wire.events import Origin
-
-_NUMBERS = 1 << 32
+from hil.wire.events import NUMBERS, Origin
 
 
 @dataclass(slots=True)
@@ -25,7 +23,7 @@ class Outlet:
     def put(self, payload: bytes) -> None:
         """Publish a payload with its number, from 1 on."""
         self.sent += 1
-        told = zenoh.SourceInfo(self.publisher.id, self.sent % _NUMBERS)
+        told = zenoh.SourceInfo(self.publisher.id, self.sent % NUMBERS)
         if not self.gid:
             self.publisher.put(payload, source_info=told)
             return
@@ -51,12 +49,3 @@ def gid_of(told: str) -> bytes:
 def attachment(number: int, stamp_ns: int, gid: bytes) -> bytes:
     """What rmw_zenoh has with every message: its number from 1 on, its time, and 16 bytes of its sender."""
     return struct.pack("<qqB16s", number, stamp_ns, len(gid), gid)
-
-
-def newer(number: int, than: int) -> bool:
-    """Whether a number comes after another of the same publisher, which begins anew after 2^32.
-
-    >>> newer(5, than=4), newer(4, than=4), newer(1, than=2**32 - 1)
-    (True, False, True)
-    """
-    return 0 < (number - than) % _NUMBERS < _NUMBERS // 2

@@ -7,8 +7,7 @@ import time
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil.wire.events import Event
-from hil.wire.outlet import newer
+from hil.wire.events import NUMBERS, Event, Origin
 from hil.wire.pubsub import Wire
 from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
 
@@ -60,7 +59,7 @@ def test_who_does_not_say_who_he_is_has_no_origin() -> None:
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 2**31 - 1))
 def test_numbers_go_on_past_their_end(number: int, more: int) -> None:
-    later = (number + more) % 2**32
-    assert newer(later, than=number)
-    assert not newer(number, than=later)
-    assert not newer(number, than=number)
+    earlier, later = Origin("a", 1, number), Origin("a", 1, (number + more) % NUMBERS)
+    assert later.is_after(earlier)
+    assert not earlier.is_after(later)
+    assert not earlier.is_after(earlier)
