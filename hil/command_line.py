@@ -67,7 +67,7 @@ def abreast() -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the console script and exit: 0 done, 1 a check failed, 2 bad usage or bad input."""
+    """Run the console script and exit: 0 done, 1 a check failed, 2 bad usage or bad input, 130 Ctrl-C."""
     try:
         code = abreast.main(
             args=None if arguments is None else list(arguments), prog_name="abreast", standalone_mode=False
@@ -81,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         code = 2
     except (click.Abort, KeyboardInterrupt):
         _say("abreast: interrupted")
-        code = 1
+        code = 130
     except AbreastError as error:
         _say(f"abreast: {error}")
         code = error.exit_code

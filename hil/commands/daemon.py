@@ -9,12 +9,14 @@ import click
 
 from formation.collector import collector_paused
 from hil.commands.daemon_workers import WORKERS, Order, overheard, serve_alone, watch_of
+from hil.commands.guard_option import NO_GUARD
 from hil.commands.natnet_options import NatNetOptions, natnet_options
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION, Seconds
 from hil.commands.wire_options import endpoints_of, wire_options
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario
+from hil.scenario.guarded import with_guards
 from hil.scenario.links import HOSTED, link_of, links_of
 
 
@@ -35,6 +37,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         certify: bool = False,
         countdown: float = 0.0,
         by_hand: bool = False,
+        no_guard: bool = False,
         **natnet: Any,
     ) -> None:
         # Wire and messages take a third of a second to load, which help needs not.
@@ -50,6 +53,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         options = NatNetOptions(**natnet)
         alone = options.natnet and not (connect or listen or zenoh_config)
         chosen = load_scenario(scenario, (*overrides, CERTIFY) if certify else overrides)
+        chosen = with_guards(chosen, present=not no_guard)
         if name in HOSTED:
             load_own_parts(chosen, estimates=name != "controller")
         needed = frozenset(filter(None, needs.split(",")))
@@ -82,6 +86,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         click.Argument(["scenario"]),
         *wire_options(),
         click.Option(["--duration"], type=DURATION, help="End after S seconds."),
+        click.Option(["--no-guard"], is_flag=True, help=NO_GUARD),
         click.Option(["--tethered"], is_flag=True, hidden=True),
     ]
     if name == "recorder":

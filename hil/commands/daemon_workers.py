@@ -160,10 +160,11 @@ def watch_of(name: str, order: Order) -> Callable[[Wire], ListenerWatch] | None:
     from hil.wire.topics import link_topics
 
     named = [(link.node_name("listeners"), link_topics(link)) for link in order.links]
-    robots = [Commanded(node, each.cmd_vel, each.odom) for node, each in named]
+    robots = [Commanded(node, each.cmd_vel, each.odom, each.wanted) for node, each in named]
     if name == "leader" and not order.by_hand:
         first = named[0][1]
-        robots = [Commanded("leader_listeners", first.leader_cmd_vel, first.leader_odom)]
+        told = first.leader_cmd_vel, first.leader_odom, first.leader_wanted
+        robots = [Commanded("leader_listeners", *told)]
     elif name not in ("follower", "controller"):
         return None
     return lambda wire: ListenerWatch(wire, layout_of(order.scenario), robots, _on_report())
@@ -174,7 +175,7 @@ def overheard(name: str, order: Order) -> frozenset[str]:
     from hil.wire.topics import link_topics
 
     if name == "leader" or (name == "emulator" and order.scenario.source.emulated == "leader"):
-        return frozenset(link_topics(link).cmd_vel for link in order.links)
+        return frozenset(link_topics(link).wanted for link in order.links)
     return frozenset()
 
 

@@ -20,6 +20,12 @@ from hil.wire.events import Origin
 CLOCK_TOLERANCE_S = 0.05
 """How far [s] a sender's clock may be from ours."""
 
+LOOK_S = 0.01
+"""From one look at the clocks to the next [s]."""
+
+REPEAT_S = 0.05
+"""After so long [s] the driver is told again what it was told last."""
+
 DRIVING = ""
 NO_COMMAND, STANDS = "no command", "told to stand"
 SILENT, LATE, CLOCK, NOT_FINITE = "silent", "late", "clock", "not finite"
@@ -106,6 +112,8 @@ class RobotGuard:
     _lapse: str = SILENT
     _ahead_s: float = 0.0
     _in_gap: bool = False
+    _said: Motion | None = None
+    _said_s: float = -math.inf
     _armed_until_s: float = -math.inf
     _excused: bool = False
 
@@ -180,6 +188,17 @@ class RobotGuard:
         )
         self._told, self._told_s = motion, now.mono_s
         return Told(motion, STANDS if wanted == STANDSTILL and motion == STANDSTILL else DRIVING)
+
+    def say(self, now: Now, *, heard: bool = False) -> Told | None:
+        """What to tell the driver now, None where it knows; ``heard``: a command has just come.
+
+        To be asked after every command and every :data:`LOOK_S`.
+        """
+        told = self.told(now)
+        if not heard and told.motion == self._said and now.mono_s - self._said_s < REPEAT_S:
+            return None
+        self._said, self._said_s = told.motion, now.mono_s
+        return told
 
     def silence_s(self, now: Now) -> float:
         """How long no fresh command has come."""

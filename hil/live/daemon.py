@@ -59,10 +59,13 @@ ANONYMOUS = Presence()
 
 
 class Ending:
-    """Whether the process was asked to end: by a signal, by its duration, or by its parent going away."""
+    """Whether the process was asked to end: by a signal, by its duration, or by its parent going away.
+
+    ``signal``: the number of the first one, 0 where it was none.
+    """
 
     def __init__(self) -> None:
-        self.asked = False
+        self.asked, self.signal = False, 0
         self._wakers: list[Callable[[], None]] = []
         self._before: dict[signal.Signals, Any] = {}
 
@@ -79,7 +82,8 @@ class Ending:
     def on_signals(self) -> None:
         """Let SIGINT, SIGTERM and SIGHUP (the terminal or the connection is gone) ask for the end."""
 
-        def handle(_number: int, _frame: FrameType | None) -> None:
+        def handle(number: int, _frame: FrameType | None) -> None:
+            self.signal = self.signal or number
             self.ask()
 
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):

@@ -9,11 +9,12 @@ from typing import Any
 
 from formation.pose import STANDSTILL, Motion
 from hil.live.reported_number import reported_number
-from hil.nodes.findings import PREFIX, findings_in, findings_json
+from hil.nodes.findings import findings_in, findings_json
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.events import Event
+from hil.wire.finding_keys import PREFIX
 from hil.wire.lab_robots import robots_of
 from hil.wire.messages import MalformedPayloadError, decode_as
 from hil.wire.source_topics import source_topics

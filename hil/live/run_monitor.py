@@ -6,12 +6,13 @@ import contextlib
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import zenoh
 
 from estimation.tracking.tracker import Status
 from formation.pose import Motion
+from hil.guard.report import GUARDS
 from hil.live.reported_number import reported_number
 from hil.nodes.findings import Findings, findings_in
 from hil.nodes.leader_driver import stop_reason
@@ -20,6 +21,7 @@ from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.key_layout import OURS, KeyLayout
 from hil.wire.messages import MalformedPayloadError, decode_as, to_ns
+from hil.wire.outlet import origin_of, sender_of
 from hil.wire.topics import Topics
 
 M = TypeVar("M", bound=msg.Message)
@@ -31,13 +33,21 @@ _COMPILES_S = 15.0
 """Between two looks [s]; more than this says that the machine stood still."""
 
 
+class Held(NamedTuple):
+    """Whom a guard holds its robot for, and why, in words."""
+
+    who: str
+    text: str
+
+
 @dataclass(slots=True, eq=False)
 class Snapshot:
     """The newest of everything, by the follower that it is of.
 
     ``followers``: their names from the leader on. ``observed_s``: for how long we have looked. ``heard``: at
     which ``observed_s`` each node last reported, ``problems``: what it said, ``findings``: what it found.
-    ``wheels``: what real robots say of their own motion, by topic. ``stopped``: by what stop.
+    ``wheels``: what real robots say of their own motion, by topic. ``stopped``: by what stop, ``stopped_by``
+    whom. ``held``: why guards let robots be driven no more, by their nodes.
     """
 
     followers: tuple[str, ...] = ()
@@ -47,6 +57,8 @@ class Snapshot:
     findings: dict[str, Findings] = field(default_factory=dict)
     motion_since_ns: int | None = None
     stopped: str | None = None
+    stopped_by: str = ""
+    held: dict[str, Held] = field(default_factory=dict)
     estimates: dict[str, msg.LeaderEstimate] = field(default_factory=dict)
     certified: dict[str, msg.CertifiedEstimate] = field(default_factory=dict)
     commands: dict[str, msg.Command] = field(default_factory=dict)
@@ -138,16 +150,15 @@ class RunMonitor:
 
     def update(self) -> Snapshot:
         """The snapshot as of now. Payloads are decoded here, not in Zenoh's threads."""
-        latest = {
-            topic: sample.payload.to_bytes()
-            for topic, newest in self._newest.items()
-            if (sample := newest.try_recv()) is not None
-        }
+        samples = {topic: newest.try_recv() for topic, newest in self._newest.items()}
+        latest = {topic: sample.payload.to_bytes() for topic, sample in samples.items() if sample is not None}
         snapshot, now = self.snapshot, time.monotonic()
         snapshot.advance(now - self._updated_at)
         self._updated_at = now
         if topics.STOP in latest and snapshot.stopped is None:
             snapshot.stopped = stop_reason(latest[topics.STOP])
+            stop = samples[topics.STOP]
+            snapshot.stopped_by = sender_of(origin_of(stop) if stop is not None else None)
         for pair in self._pairs:
             who = pair.follower
             if seen := _sound(latest, pair.estimate, msg.LeaderEstimate):
@@ -184,6 +195,11 @@ class RunMonitor:
             name = status.name.removeprefix("abreast/")
             self.snapshot.heard[name] = self.snapshot.observed_s
             self.snapshot.problems[name] = status.message if status.level else ""
+            told = {value.key: value.value for value in status.values if value.key.startswith("latched")}
+            if name.startswith(GUARDS) and told.get("latched"):
+                self.snapshot.held[name] = Held(told.get("latched_by", ""), status.message)
+            else:
+                self.snapshot.held.pop(name, None)
             for value in status.values:
                 if name not in STARTERS or value.key != "motion_since_ns":
                     continue

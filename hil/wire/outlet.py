@@ -41,6 +41,11 @@ def origin_of(sample: zenoh.Sample) -> Origin | None:
     return Origin(str(sender.zid), sender.eid, told.source_sn)
 
 
+def sender_of(origin: Origin | None) -> str:
+    """Whom to name for a message."""
+    return f"session {origin.session}" if origin is not None else "somebody without a session"
+
+
 def gid_of(told: str) -> bytes:
     """Sixteen bytes by which rmw_zenoh knows a publisher, of its token or of what else tells it apart."""
     return hashlib.blake2b(told.encode(), digest_size=16).digest()

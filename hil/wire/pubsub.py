@@ -16,7 +16,7 @@ from hil.wire.key_layout import OURS, KeyLayout, layout_of
 from hil.wire.outlet import Outlet, gid_of, origin_of
 from hil.wire.ros_tokens import Endpoint, all_tokens, endpoint_in, endpoint_token, node_token
 from hil.wire.session import Endpoints, close_session, open_session
-from hil.wire.topics import STOP, urgent_topics
+from hil.wire.topics import ARM, STOP, urgent_topics
 
 INBOX_LIMIT = 100_000
 """Payloads kept waiting at most; more than this is dropped and counted, so that memory stays bounded."""
@@ -139,7 +139,7 @@ class Wire:
 
     def _declared(self, topic: str) -> Outlet:
         urgent = topic in self._urgent
-        must_arrive = topic == STOP
+        must_arrive = topic in (STOP, ARM)
         congestion = zenoh.CongestionControl.BLOCK if must_arrive else zenoh.CongestionControl.DROP
         key = self._layout.key(topic)
         publisher = self._session.declare_publisher(
