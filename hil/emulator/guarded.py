@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from hil.guard.order_of import guard_rules
 from hil.guard.reading import read_wanted, read_word
 from hil.guard.report import REPORT_NS, node_of, problem_of, values_of
 from hil.guard.robot_guard import LOOK_S, Now, RobotGuard
-from hil.guard.rules_of import guard_rules
 from hil.nodes.node import Outgoing, diagnostics, is_due, outgoing
 from hil.scenario.links import Link
 from hil.wire import topics
@@ -32,7 +32,7 @@ class EmulatedGuards:
         pairs = [link_topics(link) for link in links]
         self._topics = [pair.cmd_vel for pair in pairs]
         self._writers = [DriveWriter(pair.follower, stamped=pair.stamped) for pair in pairs]
-        self._looks_at_frames = any(_is_fenced(guard) for guard in self._guards)
+        self._looks_at_frames = any(guard.rules.is_fenced for guard in self._guards)
         self._report_ns = now_ns
         self.due_ns = now_ns
 
@@ -91,8 +91,3 @@ class EmulatedGuards:
 
 def _moment(now_ns: int) -> Now:
     return Now(now_ns, now_ns * 1e-9)
-
-
-def _is_fenced(guard: RobotGuard) -> bool:
-    rules = guard.rules
-    return rules.separation > 0.0 or any(abs(edge) < float("inf") for edge in rules.fence)

@@ -20,6 +20,12 @@ def read_wanted(payload: bytes) -> WantedDrive | None:
     return WantedDrive(Motion(drive.v, drive.u), ns_of(drive.stamp))
 
 
+def read_driven(payload: bytes, stamped: bool) -> Motion | None:
+    """What a driver is told, by ``TwistStamped`` or ``Twist``; None for what is neither."""
+    drive = read_drive(payload, stamped)
+    return Motion(drive.v, drive.u) if drive.sound else None
+
+
 def read_word(payload: bytes) -> str | None:
     """The text of a ``std_msgs/String``, None for what is none."""
     at = begin(payload)

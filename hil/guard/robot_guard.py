@@ -56,6 +56,11 @@ class GuardRules(NamedTuple):
     fence: tuple[float, float, float, float] = (-math.inf, -math.inf, math.inf, math.inf)
     separation: float = 0.0
 
+    @property
+    def is_fenced(self) -> bool:
+        """Whether it matters where bodies are."""
+        return self.separation > 0.0 or any(math.isfinite(edge) for edge in self.fence)
+
 
 class Now(NamedTuple):
     """A moment by the host's clock [ns since 1970] and by the monotonic one [s]."""
@@ -136,6 +141,14 @@ class RobotGuard:
     def stop(self, reason: str, who: str) -> None:
         """Somebody stops everybody."""
         self._hold(Latch(STOPPED, who, f"stopped by {who}: {reason}"))
+
+    def overhear(self, motion: Motion | None, who: str) -> None:
+        """Take in a command that somebody else gives the driver: nobody may, but to make the robot stand."""
+        if motion is None or motion != STANDSTILL:
+            self._count("past_the_guard")
+            self._hold(Latch(SECOND_SENDER, who, f"{who} tells the driver what to do, past the guard"))
+            # What the driver was told last is not what we told it.
+            self._said = None
 
     def arm(self, now: Now) -> None:
         """Let the robot be driven again, by whoever sends within ``latch_s``, even if that drives already."""

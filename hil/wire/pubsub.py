@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import zenoh
 
 from hil.scenario.schema import Scenario
+from hil.wire.clock_query import tell_time
 from hil.wire.events import TICK, Event
 from hil.wire.key_layout import OURS, KeyLayout, layout_of
 from hil.wire.outlet import Outlet, gid_of, origin_of
@@ -185,8 +186,10 @@ def joined(
     """
     session = open_session(endpoints, patience, give_up)
     wire = Wire(session, urgent_topics(scenario), layout_of(scenario), node)
+    clock = tell_time(session)
     try:
         yield wire
     finally:
+        clock.undeclare()  # type: ignore[no-untyped-call]
         wire.close()
         close_session(session)
