@@ -26,6 +26,9 @@ LOOK_S = 0.01
 REPEAT_S = 0.05
 """After so long [s] the driver is told again what it was told last."""
 
+IDLE_S = 1.0
+"""Whom nobody drives is told to stand for so long [s], and then nothing more."""
+
 DRIVING = ""
 NO_COMMAND, STANDS = "no command", "told to stand"
 SILENT, LATE, CLOCK, NOT_FINITE = "silent", "late", "clock", "not finite"
@@ -119,6 +122,7 @@ class RobotGuard:
     _in_gap: bool = False
     _said: Motion | None = None
     _said_s: float = -math.inf
+    _idle_since_s: float = -math.inf
     _armed_until_s: float = -math.inf
     _excused: bool = False
 
@@ -143,9 +147,14 @@ class RobotGuard:
         self._hold(Latch(STOPPED, who, f"stopped by {who}: {reason}"))
 
     def overhear(self, motion: Motion | None, who: str) -> None:
-        """Take in a command that somebody else gives the driver: nobody may, but to make the robot stand."""
+        """Take in a command that somebody else gives the driver.
+
+        While the robot has a sender nobody may, but to make it stand; else somebody drives it by hand.
+        """
         if motion is None or motion != STANDSTILL:
             self._count("past_the_guard")
+            if self.sender is None:
+                return
             self._hold(Latch(SECOND_SENDER, who, f"{who} tells the driver what to do, past the guard"))
             # What the driver was told last is not what we told it.
             self._said = None
@@ -208,6 +217,11 @@ class RobotGuard:
         To be asked after every command and every :data:`LOOK_S`.
         """
         told = self.told(now)
+        if told.reason != NO_COMMAND or self._said is None:
+            self._idle_since_s = now.mono_s
+        elif now.mono_s - self._idle_since_s > IDLE_S:
+            # Nobody is obeyed: somebody may drive the robot by hand.
+            return None
         if not heard and told.motion == self._said and now.mono_s - self._said_s < REPEAT_S:
             return None
         self._said, self._said_s = told.motion, now.mono_s

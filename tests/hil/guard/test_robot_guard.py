@@ -273,6 +273,37 @@ def test_the_fence_and_the_least_separation_are_held() -> None:
     assert guard.told(at(0.2)).motion == STANDSTILL
 
 
+def test_a_driver_is_told_what_changes_and_again_what_does_not_and_nothing_where_nobody_drives() -> None:
+    guard = RobotGuard(RULES)
+    said = [guard.say(at(0.01 * k)) for k in range(200)]
+    assert [each.motion for each in said if each] == [STANDSTILL] * len([each for each in said if each])
+    assert 10 <= len([each for each in said[:100] if each]) <= 25
+    assert not any(said[110:])
+    sender = Sender(guard)
+    sender.say(2.0, STANDSTILL)
+    assert guard.say(at(2.0), heard=True) is not None
+    sender.say(2.02)
+    assert guard.say(at(2.02), heard=True) == (FORWARD, DRIVING)
+    assert guard.say(at(2.03)) is None
+    assert guard.say(at(2.09)) == (FORWARD, DRIVING)
+    told = guard.say(at(2.18))
+    assert told is not None
+    assert told.motion == STANDSTILL
+
+
+def test_who_tells_the_driver_past_the_guard_is_named_where_somebody_is_obeyed() -> None:
+    guard = RobotGuard(RULES)
+    guard.overhear(FORWARD, "session cc")
+    assert guard.latch is None
+    guard, sender = driving()
+    guard.overhear(STANDSTILL, "session cc")
+    assert guard.latch is None
+    guard.overhear(None, "session cc")
+    assert latched(guard) == SECOND_SENDER
+    sender.say(0.02)
+    assert guard.say(at(0.02), heard=True) == (STANDSTILL, SECOND_SENDER)
+
+
 MOTIONS = st.builds(Motion, st.floats(), st.floats())
 STEPS = st.one_of(
     st.tuples(st.just("say"), st.sampled_from("ab"), MOTIONS, st.floats(-0.2, 1.0)),
