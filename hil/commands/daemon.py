@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from formation.collector import collector_paused
-from hil.commands.daemon_workers import WORKERS, Order, overheard, serve_alone, watch_of
+from hil.commands.daemon_workers import WORKERS, Order, on_report, overheard, serve_alone, watch_of
 from hil.commands.guard_option import NO_GUARD
 from hil.commands.natnet_options import NatNetOptions, natnet_options
 from hil.commands.own_parts import load_own_parts
@@ -76,7 +76,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
             ending,
             duration,
             say_ready,
-            Presence(name, watch_of(name, order), overheard(name, order)),
+            Presence(name, watch_of(name, order), overheard(name, order), on_report()),
         )
         if dropped:
             click.echo(f"abreast {name}: {dropped} messages came too fast and were dropped", err=True)

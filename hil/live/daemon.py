@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 from types import FrameType
 from typing import Any, NamedTuple, Protocol
 
+from hil.live.flood_watch import FloodWatch
 from hil.live.listener_watch import ListenerWatch
 from hil.nodes.node import Outgoing
 from hil.scenario.schema import Scenario
@@ -48,11 +49,13 @@ class Presence(NamedTuple):
     """What the ROS graph calls a worker, and what makes the watch on who listens to it there.
 
     ``overhears``: topics that it hears though they are meant for others: it shows as no listener there.
+    ``hear``: called with the diagnostics of what floods it.
     """
 
     name: str = ""
     make_watch: Callable[[Wire], ListenerWatch] | None = None
     overhears: frozenset[str] = frozenset()
+    hear: Callable[[bytes], None] = lambda _: None
 
 
 ANONYMOUS = Presence()
@@ -121,18 +124,21 @@ def run_daemon(
 
     The worker is made once the wire is there; ``on_ready`` is called when it is subscribed. Events are taken
     one at a time in order of arrival; ``now`` is the host clock when one is taken. Topics lie where the
-    scenario has them. Returns how many arrivals found the inbox full and were dropped.
+    scenario has them. Of what comes faster than any sane sender sends only so much is taken in, except by a
+    thorough worker. Returns how many arrivals found the inbox full and were dropped.
     """
     with joined(endpoints, scenario, presence.name, give_up=lambda: ending.asked) as wire:
         ending.notify(wire.wake)
         worker = make_worker()
         worker.begin(time.time_ns())
+        if worker.thorough:
+            wire.inbox.intake = None
         for topic in worker.subscribes:
             # Who takes down everything is not who a message is meant for.
             wire.subscribe([topic], shown=not worker.thorough and topic not in presence.overhears)
         # What is loaded by now stays for good; walking it again would halt a live step for 100 ms and more.
         gc.freeze()
-        watch = presence.make_watch(wire) if presence.make_watch else None
+        watch = _reports_on(wire, presence)
         on_ready()
         try:
             _work(worker, wire, ending, duration_s, watch)
@@ -156,7 +162,11 @@ def aftermath(inbox: Inbox, worker: Worker) -> Iterator[Iterable[Outgoing]]:
 
 
 def _work(
-    worker: Worker, wire: Wire, ending: Ending, duration_s: float | None, watch: ListenerWatch | None
+    worker: Worker,
+    wire: Wire,
+    ending: Ending,
+    duration_s: float | None,
+    watch: Callable[[int], Iterable[Outgoing]],
 ) -> None:
     until = None if duration_s is None else time.monotonic() + duration_s
     taken_ns = 0
@@ -172,10 +182,24 @@ def _work(
         # Also while arrivals are waiting: who is flooded must not fall silent.
         if (taken_ns := time.time_ns()) >= worker.due_ns():
             _publish(wire, worker.take(TICK, taken_ns))
-        if watch is not None:
-            _publish(wire, watch.reports(taken_ns))
+        _publish(wire, watch(taken_ns))
     for messages in aftermath(wire.inbox, worker):
         _publish(wire, messages)
+
+
+def _reports_on(wire: Wire, presence: Presence) -> Callable[[int], Iterable[Outgoing]]:
+    """What there is to say at a time of what comes and of who listens."""
+    listeners = presence.make_watch(wire) if presence.make_watch else None
+    intake = wire.inbox.intake
+    flood = FloodWatch(presence.name, intake, presence.hear) if intake is not None else None
+
+    def reports(now_ns: int) -> Iterator[Outgoing]:
+        if listeners is not None:
+            yield from listeners.reports(now_ns)
+        if flood is not None:
+            yield from flood.reports(now_ns, time.monotonic_ns())
+
+    return reports
 
 
 def _part(worker: Worker, wire: Wire) -> None:

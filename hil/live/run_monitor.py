@@ -19,6 +19,8 @@ from hil.nodes.leader_driver import stop_reason
 from hil.scenario.links import STARTERS
 from hil.wire import message_types as msg
 from hil.wire import topics
+from hil.wire.events import Event
+from hil.wire.intake import Intake
 from hil.wire.key_layout import OURS, KeyLayout
 from hil.wire.messages import MalformedPayloadError, decode_as, to_ns
 from hil.wire.outlet import origin_of, sender_of
@@ -31,6 +33,8 @@ _STILL_U = 0.05
 _LONGEST_GLANCE = 0.25
 _COMPILES_S = 15.0
 """Between two looks [s]; more than this says that the machine stood still."""
+_MOST_NAMES = 4096
+"""Nodes of which something is kept: anybody may report under any name."""
 
 
 class Held(NamedTuple):
@@ -141,6 +145,7 @@ class RunMonitor:
     ) -> None:
         self.snapshot = Snapshot(tuple(pair.follower for pair in pairs))
         self._updated_at = time.monotonic()
+        self._intake = Intake()
         self._diagnostics = session.declare_subscriber(layout.heard(topics.DIAGNOSTICS), self._on_diagnostics)
         self._newest = {
             topic: session.declare_subscriber(layout.heard(topic), zenoh.handlers.RingChannel(1))
@@ -185,14 +190,20 @@ class RunMonitor:
         self._newest.clear()
 
     def _on_diagnostics(self, sample: zenoh.Sample) -> None:
+        said = Event(topics.DIAGNOSTICS, sample.payload.to_bytes(), origin_of(sample))
+        if not self._intake.takes(said, time.monotonic_ns()):
+            return
         try:
-            report = decode_as(sample.payload.to_bytes(), msg.DiagnosticArray)
+            report = decode_as(said.payload, msg.DiagnosticArray)
             stamp_ns = to_ns(report.header.stamp)
         except MalformedPayloadError:
             return
-        self.snapshot.findings |= findings_in(report)
+        found = findings_in(report)
         for status in report.status:
             name = status.name.removeprefix("abreast/")
+            if name not in self.snapshot.heard and len(self.snapshot.heard) >= _MOST_NAMES:
+                continue
+            self.snapshot.findings[name] = found[name]
             self.snapshot.heard[name] = self.snapshot.observed_s
             self.snapshot.problems[name] = status.message if status.level else ""
             told = {value.key: value.value for value in status.values if value.key.startswith("latched")}

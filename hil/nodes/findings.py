@@ -33,6 +33,7 @@ ADVICE = {
     "cusp": "the leader stood or turned back: give the estimator a moment of travel before relying on alpha1",
     "second_sender": "end all but one of those who send on this topic",
     "guard_latched": "see what it says; abreast arm lets the robot be driven again",
+    "flood": "find out who sends so much there, and end or slow it",
     "command_gaps": "look for what holds the controller or its link up",
     "deaf_robot": "see that the robot listens to the topic and the type of its commands",
     "command_type": "set controller.command_type to what the robot listens to",

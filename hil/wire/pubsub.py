@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -13,36 +14,52 @@ import zenoh
 from hil.scenario.schema import Scenario
 from hil.wire.clock_query import tell_time
 from hil.wire.events import TICK, Event
+from hil.wire.intake import Intake, intake_of
 from hil.wire.key_layout import OURS, KeyLayout, layout_of
 from hil.wire.outlet import Outlet, gid_of, origin_of
 from hil.wire.ros_tokens import Endpoint, all_tokens, endpoint_in, endpoint_token, node_token
 from hil.wire.session import Endpoints, close_session, open_session
 from hil.wire.topics import ARM, STOP, urgent_topics
 
-INBOX_LIMIT = 100_000
+INBOX_LIMIT, INBOX_BYTES = 100_000, 1 << 28
 """Payloads kept waiting at most; more than this is dropped and counted, so that memory stays bounded."""
 
 
 @dataclass(slots=True)
 class Inbox:
-    """Payloads in order of arrival. ``dropped``: how many found it full."""
+    """Payloads in order of arrival. ``dropped``: how many found it full.
+
+    ``intake``: what lets them in; without it all that there is room for. ``put_bytes``, ``taken_bytes``: of
+    payloads that ever came in and went out.
+    """
 
     waiting: queue.SimpleQueue[Event] = field(default_factory=queue.SimpleQueue)
     dropped: int = 0
+    intake: Intake | None = None
+    put_bytes: int = 0
+    taken_bytes: int = 0
+    _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def put(self, event: Event) -> None:
-        """Append an event; called from Zenoh's threads and from signal handlers."""
-        if self.waiting.qsize() >= INBOX_LIMIT:
-            self.dropped += 1
-        else:
+        """Append an event; called from Zenoh's threads."""
+        with self._lock:
+            if self.intake is not None and not self.intake.takes(event, time.monotonic_ns()):
+                return
+            waiting = self.put_bytes - self.taken_bytes + len(event.payload)
+            if self.waiting.qsize() >= INBOX_LIMIT or waiting > INBOX_BYTES:
+                self.dropped += 1
+                return
+            self.put_bytes += len(event.payload)
             self.waiting.put(event)
 
     def take(self, timeout: float) -> Event | None:
-        """Next event, or None after ``timeout`` [s] without one."""
+        """Next event, or None after ``timeout`` [s] without one. Called by one thread."""
         try:
-            return self.waiting.get(timeout=timeout) if timeout > 0.0 else self.waiting.get_nowait()
+            event = self.waiting.get(timeout=timeout) if timeout > 0.0 else self.waiting.get_nowait()
         except queue.Empty:
             return None
+        self.taken_bytes += len(event.payload)
+        return event
 
 
 class Wire:
@@ -182,11 +199,13 @@ def joined(
 ) -> Iterator[Wire]:
     """The wire of a scenario's lab for as long as the block lasts. ``node``: what the ROS graph shows of us.
 
+    No more is taken in than any sane lab sends.
     The rest is as of :func:`hil.wire.session.open_session`, and so is what it raises.
     """
     session = open_session(endpoints, patience, give_up)
     wire = Wire(session, urgent_topics(scenario), layout_of(scenario), node)
     clock = tell_time(session)
+    wire.inbox.intake = intake_of(scenario)
     try:
         yield wire
     finally:
