@@ -14,10 +14,12 @@ from typing import Any, NamedTuple, Protocol
 
 from hil.live.flood_watch import FloodWatch
 from hil.live.listener_watch import ListenerWatch
+from hil.live.sender_reports import SenderReports
 from hil.nodes.node import Outgoing
 from hil.scenario.schema import Scenario
 from hil.wire.events import TICK, Event
 from hil.wire.pubsub import Inbox, Wire, joined
+from hil.wire.senders import SenderWatch, single_topics
 from hil.wire.session import Endpoints
 
 _LONGEST_WAIT = 0.1
@@ -59,6 +61,13 @@ class Presence(NamedTuple):
 
 
 ANONYMOUS = Presence()
+
+
+class Watches(NamedTuple):
+    """Who may be listened to, and what there is to say, at a time, of what comes and of who listens."""
+
+    senders: SenderWatch
+    reports: Callable[[int], Iterable[Outgoing]]
 
 
 class Ending:
@@ -138,10 +147,11 @@ def run_daemon(
             wire.subscribe([topic], shown=not worker.thorough and topic not in presence.overhears)
         # What is loaded by now stays for good; walking it again would halt a live step for 100 ms and more.
         gc.freeze()
-        watch = _reports_on(wire, presence)
+        senders = SenderWatch(single_topics(scenario))
+        watch = _reports_on(wire, presence, senders)
         on_ready()
         try:
-            _work(worker, wire, ending, duration_s, watch)
+            _work(worker, wire, ending, duration_s, Watches(senders, watch))
         except Exception:
             # A controller that breaks down says stop all the same. The first error is the one to tell.
             with contextlib.suppress(Exception):
@@ -166,7 +176,7 @@ def _work(
     wire: Wire,
     ending: Ending,
     duration_s: float | None,
-    watch: Callable[[int], Iterable[Outgoing]],
+    watches: Watches,
 ) -> None:
     until = None if duration_s is None else time.monotonic() + duration_s
     taken_ns = 0
@@ -177,25 +187,28 @@ def _work(
         if now_ns < taken_ns:
             # The clock was set back: what was due soon is now far away.
             _publish(wire, worker.take(TICK, now_ns))
-        if event is not None:
+        # Who takes down everything takes that of strangers too.
+        if event is not None and (watches.senders.admits(event, time.monotonic_ns()) or worker.thorough):
             _publish(wire, worker.take(event, now_ns))
         # Also while arrivals are waiting: who is flooded must not fall silent.
         if (taken_ns := time.time_ns()) >= worker.due_ns():
             _publish(wire, worker.take(TICK, taken_ns))
-        _publish(wire, watch(taken_ns))
+        _publish(wire, watches.reports(taken_ns))
     for messages in aftermath(wire.inbox, worker):
         _publish(wire, messages)
 
 
-def _reports_on(wire: Wire, presence: Presence) -> Callable[[int], Iterable[Outgoing]]:
+def _reports_on(wire: Wire, presence: Presence, senders: SenderWatch) -> Callable[[int], Iterable[Outgoing]]:
     """What there is to say at a time of what comes and of who listens."""
     listeners = presence.make_watch(wire) if presence.make_watch else None
     intake = wire.inbox.intake
+    second = SenderReports(presence.name, senders, presence.hear)
     flood = FloodWatch(presence.name, intake, presence.hear) if intake is not None else None
 
     def reports(now_ns: int) -> Iterator[Outgoing]:
         if listeners is not None:
             yield from listeners.reports(now_ns)
+        yield from second.reports(now_ns, time.monotonic_ns())
         if flood is not None:
             yield from flood.reports(now_ns, time.monotonic_ns())
 

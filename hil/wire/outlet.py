@@ -11,6 +11,8 @@ import zenoh
 
 from hil.wire.events import NUMBERS, Origin
 
+_ATTACHED = struct.Struct("<qqB16s")
+
 
 @dataclass(slots=True)
 class Outlet:
@@ -36,9 +38,18 @@ def origin_of(sample: zenoh.Sample) -> Origin | None:
     """Who sent a sample, None where it does not say."""
     told = sample.source_info
     if told is None:
-        return None
+        return _attached(sample.attachment)
     sender = told.source_id
     return Origin(str(sender.zid), sender.eid, told.source_sn)
+
+
+def _attached(attached: zenoh.ZBytes | None) -> Origin | None:
+    """Who sent a message of rmw_zenoh, by what it attaches."""
+    held = attached.to_bytes() if attached is not None else b""
+    if len(held) != _ATTACHED.size:
+        return None
+    number, _, length, gid = _ATTACHED.unpack(held)
+    return Origin(gid.hex(), 0, number % NUMBERS) if length == len(gid) else None
 
 
 def sender_of(origin: Origin | None) -> str:
@@ -53,4 +64,4 @@ def gid_of(told: str) -> bytes:
 
 def attachment(number: int, stamp_ns: int, gid: bytes) -> bytes:
     """What rmw_zenoh has with every message: its number from 1 on, its time, and 16 bytes of its sender."""
-    return struct.pack("<qqB16s", number, stamp_ns, len(gid), gid)
+    return _ATTACHED.pack(number, stamp_ns, len(gid), gid)
