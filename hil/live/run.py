@@ -20,6 +20,7 @@ from hil.live.run_monitor import RunMonitor, Snapshot
 from hil.nodes.findings import named_findings
 from hil.nodes.link_nodes import leader_standstill, standstill
 from hil.nodes.node import diagnostics
+from hil.nodes.stopping import SUPERVISOR, stop_finding
 from hil.scenario.files import scenario_text
 from hil.scenario.links import HOSTED, links_of, node_names
 from hil.scenario.schema import Scenario
@@ -207,9 +208,8 @@ class _Supervisor:
     def _tell_who_stopped(self, who: str, reason: str) -> None:
         """Leave in the log by whom and why the run was stopped."""
         now_ns = time.time_ns()
-        values = {"stopped_by.who": who, "stopped_by.reason": reason}
-        found = named_findings({"stopped_by": f"the run was stopped by {who}: {reason}"})
-        report = diagnostics("run", now_ns, f"stopped by {who}: {reason}", values | found)
+        found = named_findings(stop_finding(who, reason))
+        report = diagnostics(SUPERVISOR, now_ns, f"stopped by {who}: {reason}", found)
         self._wire.publish(topics.DIAGNOSTICS, encode(report))
 
     def _stop(self, reason: str) -> list[str]:
