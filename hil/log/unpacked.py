@@ -58,10 +58,8 @@ def salvaged(path: Path) -> Log:
     """
     copy = Copy(path.name)
     done = recover(path, copy.file)
-    if not done.messages:
-        raise damaged(path, "no message of it can be read")
     log = in_place_of(path, read_log(copy.file), copy)
-    return replace(log, damage=f"the log is damaged: {done.said()}")
+    return log if done.complete else replace(log, damage=f"the log is damaged: {done.said()}")
 
 
 def whole_or_salvaged(path: Path) -> Log:
