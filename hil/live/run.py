@@ -16,6 +16,7 @@ from hil.live.child_processes import Children
 from hil.live.crew import Crew, processes_of
 from hil.live.daemon import Ending
 from hil.live.run_monitor import RunMonitor, Snapshot
+from hil.log.written_aside import write_text_aside
 from hil.nodes.link_nodes import leader_standstill, standstill
 from hil.scenario.files import scenario_text
 from hil.scenario.links import HOSTED, links_of, node_names
@@ -70,7 +71,7 @@ def run_live(
     folder = log_path.parent
     resolved = folder / "scenario.toml"
     try:
-        resolved.write_text(scenario_text(scenario), encoding="utf-8")
+        write_text_aside(resolved, scenario_text(scenario))
     except OSError as error:
         raise UsageError(
             f"--out {folder}: cannot be written ({error.strerror}); give another folder"
@@ -99,7 +100,7 @@ class _Supervisor:
         watched = self._robots[0 if crew.drives_leader else 1 :] if crew.real else ()
         self._wheels = {each.odom: each.name for each in watched}
         self._monitor = RunMonitor(self._session, pairs, layout_of(scenario), tuple(self._wheels))
-        self._children = Children(log_path.parent)
+        self._children = Children()
         self._drivers: list[str] = []
         for name, daemon, followers in processes_of(self._links, crew.daemons):
             arguments = [str(resolved), *joining.options, *crew.options(daemon, log_path)]

@@ -191,6 +191,12 @@ class ChunkedMcap:
         footer = Footer(summary_start=summary_start, summary_offset_start=offsets_start, summary_crc=crc)
         self._emit(summary + _bytes_of([footer]) + MAGIC)
 
+    @staticmethod
+    def bare_end() -> bytes:
+        """The end of a file that has no room for a summary: whoever reads it looks at all of its records."""
+        footer = Footer(summary_start=0, summary_offset_start=0, summary_crc=0)
+        return _bytes_of([DataEnd(data_section_crc=0), footer]) + MAGIC
+
     def _declare(self, record: Schema | Channel) -> None:
         data = _bytes_of([record])
         self._declarations += data

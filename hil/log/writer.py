@@ -10,6 +10,7 @@ from typing import Self
 from hil import __version__
 from hil.errors import AbreastError, UsageError
 from hil.log import metadata_sums
+from hil.log.disk import disk_of
 from hil.log.mcap_chunks import ChunkedMcap
 from hil.wire.messages import definition, rihs01
 
@@ -31,7 +32,8 @@ class LogWriter:
     in front does not take with it what follows. Metadata are followed by their sums.
 
     Raises :class:`UsageError` if the file exists or can't be created, and :class:`AbreastError` from any
-    method once the disk refuses to take more; what was written before stays recoverable.
+    method once the disk refuses to take more; the file then ends behind what was written before, without a
+    summary. ``messages``, ``bytes``: how many were taken, and the size of the file.
     """
 
     def __init__(
@@ -43,6 +45,7 @@ class LogWriter:
     ) -> None:
         self.path = path
         self.messages = 0
+        self.bytes = 0
         self._flush_every_ns = round(flush_every_s * 1e9)
         # Earliest log time in the open chunk, and the one that it does not reach; equal while it is empty.
         self._first_ns = self._until_ns = 0
@@ -146,12 +149,28 @@ class LogWriter:
         if self._failed:
             raise AbreastError(f"log {self.path}: given up after an earlier write error")
         try:
-            rest = memoryview(data)
-            while rest:
-                rest = rest[self._file.write(rest) :]
+            self._put(data)
         except OSError as error:
             self._failed = True
-            reason = error.strerror or str(error)
+            reason, disk = error.strerror or str(error), disk_of(self.path)
+            whole = self._end_early()
+            kept = "it is whole up to there" if whole else "abreast recover keeps what is whole"
             raise AbreastError(
-                f"log {self.path}: writing failed ({reason}); what came before is there for: abreast recover"
+                f"log {self.path}: writing failed ({reason}) on {disk}; {kept}, make room there"
             ) from error
+        self.bytes += len(data)
+
+    def _put(self, data: bytes) -> None:
+        rest = memoryview(data)
+        while rest:
+            rest = rest[self._file.write(rest) :]
+
+    def _end_early(self) -> bool:
+        """End the file behind the last records that are whole; whether the disk has room for that."""
+        try:
+            self._file.truncate(self.bytes)
+            self._file.seek(self.bytes)
+            self._put(ChunkedMcap.bare_end())
+        except OSError:
+            return False
+        return True
