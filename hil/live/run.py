@@ -15,6 +15,7 @@ from hil.errors import UsageError
 from hil.live.child_processes import Children
 from hil.live.crew import Crew, processes_of
 from hil.live.daemon import Ending
+from hil.live.disk_watch import refuse_full_disk
 from hil.live.run_monitor import RunMonitor, Snapshot
 from hil.log.written_aside import write_text_aside
 from hil.nodes.link_nodes import leader_standstill, standstill
@@ -49,13 +50,15 @@ Show = Callable[[Snapshot, float | None], None]
 class Outcome:
     """How a live run ended: what failed (empty: nothing), whether it was interrupted, how long it drove.
 
-    ``robots``: in words, what was seen of how the robots were left.
+    ``robots``: in words, what was seen of how the robots were left. ``recorded``: the recorder was heard, so
+    that there was a log.
     """
 
     failure: str
     interrupted: bool
     duration_s: float
     robots: str
+    recorded: bool = False
 
 
 def run_live(
@@ -69,6 +72,7 @@ def run_live(
     second. However it ends, the robots are stopped, the log is finished and no process is left.
     """
     folder = log_path.parent
+    refuse_full_disk(folder)
     resolved = folder / "scenario.toml"
     try:
         write_text_aside(resolved, scenario_text(scenario))
@@ -140,7 +144,8 @@ class _Supervisor:
             unseen = f"{', '.join(moving)} {'have' if len(moving) > 1 else 'has'} not been seen to stand"
             unseen += f" within {STANDSTILL_TIMEOUT:g} s; use {'their' if len(moving) > 1 else 'its'} switch"
             failure = f"{failure}; {unseen}" if failure else unseen
-        return Outcome(failure, ending.asked, driven, self._how_left())
+        recorded = "recorder" in self._monitor.snapshot.heard
+        return Outcome(failure, ending.asked, driven, self._how_left(), recorded)
 
     def close(self) -> None:
         """Who drives robots first, its last word being a standstill; recorder last, to miss nothing."""

@@ -90,6 +90,10 @@ class LogWriter:
         self._sums |= metadata_sums.sums_of(metadata)
         self._mcap.add_metadata(metadata_sums.RECORD, self._sums)
 
+    def descriptor(self) -> int:
+        """Descriptor of the file, for as long as it is open."""
+        return self._file.fileno()
+
     def flush(self) -> None:
         """Hand everything written so far to the operating system: it then survives a kill of the process."""
         self._mcap.close_chunk()

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import zenoh
 
 from hil.scenario.schema import Scenario
-from hil.wire.events import TICK, Event
+from hil.wire.events import OVERSIZED, TICK, Event
 from hil.wire.key_layout import OURS, KeyLayout, layout_of
 from hil.wire.ros_tokens import Endpoint, all_tokens, endpoint_in, endpoint_token, node_token
 from hil.wire.session import Endpoints, close_session, open_session
@@ -22,6 +22,11 @@ from hil.wire.topics import STOP, urgent_topics
 
 INBOX_LIMIT = 100_000
 """Payloads kept waiting at most; more than this is dropped and counted, so that memory stays bounded."""
+LARGEST_PAYLOAD_BYTES = 4 << 20
+"""A larger one is not taken: no message of a lab is a thousandth of that."""
+_PAGE_BYTES = 1 << 12
+_MOST_PAGES = 1 << 16
+"""Pages that payloads may fill while they wait, those of less than one not counted: 256 MiB."""
 
 
 @dataclass(slots=True)
@@ -30,20 +35,28 @@ class Inbox:
 
     waiting: queue.SimpleQueue[Event] = field(default_factory=queue.SimpleQueue)
     dropped: int = 0
+    # One entry for each page: a queue is what threads and signal handlers can count in without a lock.
+    _pages: queue.SimpleQueue[None] = field(default_factory=queue.SimpleQueue)
 
     def put(self, event: Event) -> None:
         """Append an event; called from Zenoh's threads and from signal handlers."""
-        if self.waiting.qsize() >= INBOX_LIMIT:
+        pages = len(event.payload) // _PAGE_BYTES
+        if self.waiting.qsize() >= INBOX_LIMIT or (pages and self._pages.qsize() + pages > _MOST_PAGES):
             self.dropped += 1
-        else:
-            self.waiting.put(event)
+            return
+        for _ in range(pages):
+            self._pages.put(None)
+        self.waiting.put(event)
 
     def take(self, timeout: float) -> Event | None:
         """Next event, or None after ``timeout`` [s] without one."""
         try:
-            return self.waiting.get(timeout=timeout) if timeout > 0.0 else self.waiting.get_nowait()
+            event = self.waiting.get(timeout=timeout) if timeout > 0.0 else self.waiting.get_nowait()
         except queue.Empty:
             return None
+        for _ in range(len(event.payload) // _PAGE_BYTES):
+            self._pages.get_nowait()
+        return event
 
 
 @dataclass(slots=True)
@@ -100,7 +113,8 @@ class Wire:
         for topic in topics:
 
             def keep(sample: zenoh.Sample, topic: str = topic) -> None:
-                self.inbox.put(Event(topic, sample.payload.to_bytes()))
+                sized = len(sample.payload) <= LARGEST_PAYLOAD_BYTES
+                self.inbox.put(Event(topic, sample.payload.to_bytes() if sized else OVERSIZED))
 
             direct = zenoh.handlers.Callback(keep, indirect=False)
             key = self._layout.heard(topic)

@@ -9,7 +9,7 @@ from hil.errors import AbreastError, UsageError
 from hil.log.disk import disk_of
 from hil.log.report_json import write_json
 from hil.log.written_aside import write_text_aside, written_aside
-from tests.hil.log.small_disk import small_disk
+from tests.hil.small_disk import small_disk
 
 
 def test_what_was_written_takes_its_place_at_the_end(tmp_path: Path) -> None:
