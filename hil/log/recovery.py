@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from hil.errors import AbreastError, UsageError
+from hil.log.disk import disk_of
 from hil.log.lost_spans import Span
 from hil.log.mcap_summary import McapSummary, read_summary
 from hil.log.reader import DAMAGE, DamagedLogError, check_mcap
@@ -83,7 +84,9 @@ def recover(source: Path, target: Path) -> Recovery:
     except OSError as error:
         target.unlink(missing_ok=True)
         reason = error.strerror or str(error)
-        raise AbreastError(f"log {target}: recovering {source} failed ({reason}); free the disk") from error
+        raise AbreastError(
+            f"log {target}: recovering {source} failed ({reason}) on {disk_of(target)}; make room there"
+        ) from error
     except BaseException:
         target.unlink(missing_ok=True)
         raise
