@@ -29,7 +29,7 @@ class Recorder:
     """Writes each payload with its time of arrival. A worker of :mod:`hil.live.daemon`.
 
     A payload that is not a valid message of its topic's type would make the log unreadable for others: it
-    goes to the topic ``malformed``, byte for byte.
+    goes to the topic ``malformed``, byte for byte, and so does what stands for one that is too large.
     """
 
     thorough = True
@@ -97,13 +97,13 @@ class Recorder:
 
     def _write(self, event: Event, now_ns: int) -> None:
         topic, typename, payload = event.topic, self._types[event.topic], event.payload
-        if payload is OVERSIZED:
-            self._oversized = counted(self._oversized, topic)
-            return
         try:
             decode(payload, typename)
         except MalformedPayloadError:
-            self._malformed = counted(self._malformed, topic)
+            if payload is OVERSIZED:
+                self._oversized = counted(self._oversized, topic)
+            else:
+                self._malformed = counted(self._malformed, topic)
             kept = Malformed(header(now_ns, ""), topic, np.frombuffer(payload, dtype=np.uint8))
             topic, typename, payload = topics.MALFORMED, typename_of(Malformed), encode(kept)
         # In order even if the clock is set back, so that a replay finds it in order.

@@ -168,8 +168,9 @@ class ChunkedMcap:
     def finish(self) -> None:
         """Write what is still in memory, the summary and the end of the file."""
         self.close_chunk()
-        self._emit(_bytes_of([DataEnd(data_section_crc=0)]))
-        summary_start = self._offset
+        # With the summary, at once: where that does not fit the data go on to their end all the same.
+        data_end = _bytes_of([DataEnd(data_section_crc=0)])
+        summary_start = self._offset + len(data_end)
         groups: list[tuple[Opcode, bytes]] = [
             (Opcode.SCHEMA, _bytes_of(self._schemas)),
             (Opcode.CHANNEL, _bytes_of(self._channels)),
@@ -189,7 +190,7 @@ class ChunkedMcap:
         footer_head = _FOOTER_HEAD.pack(Opcode.FOOTER, _FOOTER_BYTES, summary_start, offsets_start)
         crc = zlib.crc32(footer_head, zlib.crc32(summary))
         footer = Footer(summary_start=summary_start, summary_offset_start=offsets_start, summary_crc=crc)
-        self._emit(summary + _bytes_of([footer]) + MAGIC)
+        self._emit(data_end + summary + _bytes_of([footer]) + MAGIC)
 
     @staticmethod
     def bare_end() -> bytes:

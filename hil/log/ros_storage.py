@@ -22,6 +22,7 @@ from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typest
 from rosbags.typesys.store import Typestore
 
 from hil.errors import UsageError
+from hil.log.chunk_unpacking import LARGEST_CHUNK_BYTES
 from hil.log.reader import DAMAGE, Log, Record
 from hil.wire.messages import known_types
 
@@ -166,7 +167,10 @@ def _converter(
 
 
 def _unzipped(payload: bytes) -> bytes:
-    return zstandard.decompress(payload)
+    told = zstandard.get_frame_parameters(payload).content_size
+    if LARGEST_CHUNK_BYTES < told != zstandard.CONTENTSIZE_UNKNOWN:
+        raise zstandard.ZstdError(f"a message of {len(payload)} bytes claims to hold {told}")
+    return zstandard.ZstdDecompressor().decompress(payload, max_output_size=LARGEST_CHUNK_BYTES)
 
 
 def _text(connection: Connection) -> str:
