@@ -33,6 +33,7 @@ def command(
     scenario: str,
     connect: str | None,
     listen: str | None,
+    secure: Path | None,
     zenoh_config: Path | None,
     duration: float,
     drive: str | None,
@@ -52,7 +53,9 @@ def command(
     findings: list[dict[str, Any]] = []
     checks = [
         disk_check(out),
-        *_visited(chosen, endpoints_of(connect, listen, zenoh_config), duration, drive, findings),
+        *_visited(
+            chosen, endpoints_of(connect, listen, zenoh_config, secure, "operator"), duration, drive, findings
+        ),
     ]
     if as_json:
         click.echo(json.dumps({"checks": [each.as_dict() for each in checks], "findings": findings}))

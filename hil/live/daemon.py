@@ -18,6 +18,7 @@ from hil.scenario.schema import Scenario
 from hil.wire.events import TICK, Event
 from hil.wire.pubsub import Inbox, Wire, joined
 from hil.wire.session import Endpoints
+from hil.wire.topics import STOP
 
 _LONGEST_WAIT = 0.1
 _LINGER = 0.05
@@ -175,7 +176,9 @@ def _work(
 
 
 def _part(worker: Worker, wire: Wire) -> None:
-    _publish(wire, worker.end(time.time_ns()))
+    # Where keys say that only operators and guards give orders, a parting stop is not ours to say.
+    last = worker.end(time.time_ns())
+    _publish(wire, (each for each in last if each.topic != STOP or wire.may_publish(STOP)))
     time.sleep(_LINGER)
 
 

@@ -26,7 +26,7 @@ from hil.wire.key_layout import layout_of
 from hil.wire.lab_robots import robots_of
 from hil.wire.messages import encode
 from hil.wire.pubsub import Wire
-from hil.wire.session import Endpoints, close_session, open_session
+from hil.wire.session import Endpoints, allowed_keys, close_session, open_session
 from hil.wire.topics import link_topics, urgent_topics
 
 START_TIMEOUT = 120.0
@@ -93,8 +93,9 @@ class _Supervisor:
         self._links = links_of(scenario)
         pairs = [link_topics(link) for link in self._links]
         self._nodes = [name for daemon in crew.daemons for name in node_names(daemon, self._links)]
+        allowed = allowed_keys(joining)
         self._session = open_session(joining)
-        self._wire = Wire(self._session, urgent_topics(scenario), layout_of(scenario), "run")
+        self._wire = Wire(self._session, urgent_topics(scenario), layout_of(scenario), "run", allowed)
         self._robots = robots_of(scenario)
         watched = self._robots[0 if crew.drives_leader else 1 :] if crew.real else ()
         self._wheels = {each.odom: each.name for each in watched}
@@ -217,7 +218,9 @@ class _Supervisor:
         if self._crew.drives_leader:
             still.append(leader_standstill(self._scenario, time.time_ns()))
         for message in still:
-            self._wire.publish(message.topic, message.payload)
+            # Behind a guard it is the guard that lets a robot stand, by the stop.
+            if self._wire.may_publish(message.topic):
+                self._wire.publish(message.topic, message.payload)
 
     def _somebody_moves(self, heard: set[str]) -> bool:
         """Whether a robot that was seen has yet to stand; without the emulator no emulated one ever will.
