@@ -51,12 +51,8 @@ def command(
 
     chosen = load_scenario(scenario, overrides)
     findings: list[dict[str, Any]] = []
-    checks = [
-        disk_check(out),
-        *_visited(
-            chosen, endpoints_of(connect, listen, zenoh_config, secure, "operator"), duration, drive, findings
-        ),
-    ]
+    endpoints = endpoints_of(connect, listen, zenoh_config, secure, "operator")
+    checks = [disk_check(out), *_visited(chosen, endpoints, duration, drive, findings)]
     if as_json:
         click.echo(json.dumps({"checks": [each.as_dict() for each in checks], "findings": findings}))
     else:

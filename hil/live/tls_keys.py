@@ -25,9 +25,8 @@ from hil.wire.session_config import role_text
 
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 _PORT = 7447
-_HOST = re.compile(
-    r"(?=.{1,253}$)[A-Za-z0-9]([A-Za-z0-9-]*[A-Za-z0-9])?(\.[A-Za-z0-9]([A-Za-z0-9-]*[A-Za-z0-9])?)*"
-)
+_LABEL = r"[A-Za-z0-9]([A-Za-z0-9-]*[A-Za-z0-9])?"
+_HOST = re.compile(rf"(?=.{{1,253}}$){_LABEL}(\.{_LABEL})*")
 _CLOCKS_DIFFER = datetime.timedelta(days=1)
 _USAGE = {
     "digital_signature": False, "content_commitment": False, "key_encipherment": False,

@@ -1,6 +1,7 @@
 """Who may say and hear what on a lab's wire: roles, and Zenoh's access control made of them by topic.
 
-What is not allowed here is refused by the router. Nobody may delete, answer queries, or publish by a wildcard.
+What is not allowed here is refused by the router. Nobody may delete, ask or
+answer queries, or publish by a wildcard.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from hil.wire.source_topics import source_topics
 from hil.wire.topics import DIAGNOSTICS, ONLY_IN_LOGS, RIGID_BODIES, STOP, link_topics, types_of
 
 Role = Literal[
-    "router", "estimator", "controller", "follower", "leader", "recorder", "guard", "mocap", "robot", "bridge",
-    "emulator", "operator", "viewer",
+    "router", "estimator", "controller", "follower", "leader", "recorder", "guard", "mocap", "robot",
+    "bridge", "emulator", "operator", "viewer",
 ]  # fmt: skip
 """What a session is on the wire; ``bridge``: robots and motion capture in one, as of a bridge to ROS 2."""
 

@@ -169,8 +169,8 @@ class Wire:
     def _declare(self, topic: str) -> _Outlet:
         if not self.may_publish(topic):
             raise UsageError(
-                f"{self._layout.key(topic)}: these keys do not let {self._node or 'us'} publish there; see who "
-                "may in docs/security.md, and make keys for this scenario by abreast secure init"
+                f"{self._layout.key(topic)}: our keys do not let us publish there; docs/security.md says who "
+                "may; were they made for this scenario, with guards where there are some?"
             )
         with self._lock:
             if (declared := self._outlets.get(topic)) is not None:

@@ -22,10 +22,8 @@ def reason_for(endpoint: str, keys: RoleKeys | None) -> str:
     try:
         with socket.create_connection((host, port), timeout=_KNOCK_S) as knocking:
             if keys is None:
-                hint = (
-                    "give --secure DIR if that router has keys" if protocol == "tcp" else "give --secure DIR"
-                )
-                return f"somebody is there, who lets nobody in like this: {hint}"
+                hint = " if that router has keys" if protocol == "tcp" else ""
+                return f"somebody is there, who lets nobody in like this: give --secure DIR{hint}"
             return _shown(knocking, host, keys)
     except OSError:
         return _NOBODY

@@ -46,8 +46,8 @@ class RoleKeys(NamedTuple):
         for path in (self.authority, self.certificate, self.secret, self.config):
             if not path.is_file():
                 raise UsageError(
-                    f"--secure {self.folder}: there is no {path.name}, expected the files of role {self.role}; "
-                    f"{self._instead()}"
+                    f"--secure {self.folder}: there is no {path.name}, expected the files of "
+                    f"{self.role}; {self._instead()}"
                 )
         mode = self.secret.stat().st_mode
         if mode & _OTHERS:
@@ -59,5 +59,5 @@ class RoleKeys(NamedTuple):
     def _instead(self) -> str:
         there = [role for role in ROLES if (self.folder / f"{role}.key").is_file()]
         if there:
-            return f"it holds the keys of {', '.join(there)}: copy those of {self.role} from where they were made"
+            return f"it holds the keys of {', '.join(there)}: copy those of {self.role} to it"
         return f"make one with abreast secure init {self.folder}"

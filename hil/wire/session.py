@@ -75,7 +75,7 @@ class Endpoints:
     def _check_keys(self, keys: RoleKeys) -> None:
         if self.config_file is not None:
             raise UsageError(
-                f"--zenoh-config {self.config_file}: --secure has a configuration itself; leave one of both out"
+                f"--zenoh-config {self.config_file}: --secure has its own; leave one of both out"
             )
         if self.listen is not None and keys.role != ROUTER:
             raise UsageError(
@@ -190,7 +190,7 @@ def _opened(
             return
         found.append(session)
         if left.is_set():
-            session.close()
+            close_session(session)
 
     thread = threading.Thread(target=attempt, daemon=True)
     thread.start()
