@@ -69,6 +69,7 @@ def _visited(
 ) -> Iterator[Check]:
     """Checks of all that can be reached by the wire; what estimators find is put to the findings."""
     with collector_paused():
+        from hil.doctor.access_check import access_of_lab
         from hil.doctor.machine_checks import port_check, route_check
         from hil.doctor.visit import Visit
         from hil.wire.key_layout import layout_of
@@ -83,6 +84,7 @@ def _visited(
     try:
         with joined(endpoints, scenario, "doctor", patience=3.0) as wire:
             yield route_check(endpoints.describe(), "")
+            yield access_of_lab(endpoints, wire.shown_names())
             visit = Visit(scenario, wire)
             examination = visit.examination
             robot = examination.robot(drive) if drive else None
@@ -131,6 +133,6 @@ def _show(checks: list[Check]) -> None:
     for each in checks:
         mark = Text("ok") if each.ok else Text("no", "red")
         table.add_row(mark, each.name, Text(each.seen), Text("" if each.ok else each.expected))
-        if not each.ok:
+        if each.advice:
             table.add_row("", "", Text(each.advice, "bold"), "")
     Console().print(table)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,26 +76,33 @@ def run_live(
         raise UsageError(
             f"--out {folder}: cannot be written ({error.strerror}); give another folder"
         ) from None
-    router = open_session(endpoints) if endpoints.listen else None
-    supervisor = _Supervisor(scenario, resolved, log_path, endpoints.joining, crew)
-    try:
+    with ExitStack() as held:
+        if endpoints.listen:
+            held.callback(close_session, open_session(endpoints))
+        supervisor = _Supervisor(
+            scenario, resolved, log_path, endpoints.joining, crew, give_up=lambda: ending.asked
+        )
+        held.callback(supervisor.close)
         return supervisor.run(ending, show)
-    finally:
-        supervisor.close()
-        if router is not None:
-            close_session(router)
 
 
 class _Supervisor:
     def __init__(
-        self, scenario: Scenario, resolved: Path, log_path: Path, joining: Endpoints, crew: Crew
+        self,
+        scenario: Scenario,
+        resolved: Path,
+        log_path: Path,
+        joining: Endpoints,
+        crew: Crew,
+        *,
+        give_up: Callable[[], bool] = lambda: False,
     ) -> None:
         self._scenario, self._crew = scenario, crew
         self._links = links_of(scenario)
         pairs = [link_topics(link) for link in self._links]
         self._nodes = [name for daemon in crew.daemons for name in node_names(daemon, self._links)]
         allowed = allowed_keys(joining)
-        self._session = open_session(joining)
+        self._session = open_session(joining, give_up=give_up)
         self._wire = Wire(self._session, urgent_topics(scenario), layout_of(scenario), "run", allowed)
         self._robots = robots_of(scenario)
         watched = self._robots[0 if crew.drives_leader else 1 :] if crew.real else ()

@@ -146,6 +146,11 @@ class Wire:
         )
         self._subscribers.append(watching)
 
+    def shown_names(self) -> tuple[str, ...]:
+        """Common names of the certificates that the other ends of our links show, of each that shows one."""
+        shown = (link.auth_identifier for link in self._session.info.links())
+        return tuple(name for name in shown if name)
+
     def graph(self) -> tuple[Endpoint, ...]:
         """Publishers and subscriptions of everybody, as far as they show in the ROS graph."""
         return tuple(self._graph.copy().values())

@@ -29,7 +29,7 @@ from hil.wire.session_config import (
 _ENDPOINT = re.compile(r"[a-z][a-z0-9_-]*/\S+")
 _RETRY_S = 0.2
 _GLANCE_S = 0.05
-_OVERTIME_S = 1.0
+_OVERTIME_S = 2.5
 _CLOSE_S = 2.0
 
 
@@ -127,7 +127,7 @@ def open_session(
         if give_up():
             raise GaveUpError(f"ended while it waited for {endpoints.describe()}")
         if not connects_to(config) or time.monotonic() >= deadline:
-            raise NoRouterError(f"zenoh {endpoints.describe()}: no session ({_why(endpoints, config, error)}")
+            raise NoRouterError(f"zenoh {_why(endpoints, config, error)}")
         time.sleep(_RETRY_S)
 
 
@@ -174,10 +174,9 @@ def refuse_deaf(endpoints: Endpoints) -> None:
 def _opened(
     config: zenoh.Config, deadline: float, give_up: Callable[[], bool]
 ) -> zenoh.Session | zenoh.ZError | None:
-    """A session, or why there is none; None where an attempt takes too long.
+    """A session, or why there is none; None where an attempt takes too long, as a config file may want it.
 
-    Zenoh attempts it in a thread: signals must be heard meanwhile, and an address that swallows everything
-    may hold it up for long.
+    Zenoh attempts it in a thread, as signals must be heard meanwhile.
     """
     found: list[zenoh.Session | zenoh.ZError] = []
     left = threading.Event()
@@ -194,22 +193,25 @@ def _opened(
 
     thread = threading.Thread(target=attempt, daemon=True)
     thread.start()
-    while thread.is_alive() and time.monotonic() < deadline + _OVERTIME_S and not give_up():
-        thread.join(_GLANCE_S)
-    left.set()
-    # One that comes back while Python shuts down would abort it; nearly all come back at once.
-    thread.join(_RETRY_S)
+    try:
+        while thread.is_alive() and time.monotonic() < deadline + _OVERTIME_S and not give_up():
+            thread.join(_GLANCE_S)
+    finally:
+        left.set()
+        # One that came back while Python shuts down would abort it.
+        thread.join(_OVERTIME_S)
     return found[0] if found else None
 
 
 def _why(endpoints: Endpoints, config: zenoh.Config, error: zenoh.ZError | None) -> str:
-    """The reason in Zenoh's words, closing the bracket, and what to do about it."""
+    """Where there is no session, the reason in Zenoh's words, and what to do about it."""
     said = _told(error) if error is not None else "no answer"
-    listening = listens_at(config)
-    if "listener" in said and listening:
-        return f"{said}); somebody listens at {listening[0]} already: connect to it, or take another port"
-    missing = connects_to(config)
-    return f"{said}); {reason_for(missing[0], endpoints.keys) if missing else 'is the endpoint right?'}"
+    taken, missing = listens_at(config), connects_to(config)
+    if taken and ("listener" in said or not missing):
+        advice = f"somebody may listen at {taken[0]} already: connect to it, or listen elsewhere"
+        return f"{endpoints.describe()}: no session ({said}); {advice}"
+    advice = reason_for(missing[0], endpoints.keys)
+    return f"{endpoints.config_file or missing[0]}: no session ({said}); {advice}"
 
 
 def _told(error: zenoh.ZError) -> str:

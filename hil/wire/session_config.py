@@ -18,6 +18,8 @@ _PATIENT = {
     f"{_QUEUE}/size/data": 16,
     f"{_QUEUE}/congestion_control/drop/wait_before_drop": 5000,
 }
+# Who is waited for is asked again; ten seconds for one answer would hold up whoever wants to leave.
+_OPEN_MS = 2000
 _QUIET: dict[str, Any] = {
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
@@ -112,7 +114,7 @@ def listens_at(config: zenoh.Config) -> list[str]:
 
 
 def _lay_over(config: zenoh.Config, connect: str | None, listen: str | None) -> None:
-    for key, ours in {**_QUIET, **_PATIENT}.items():
+    for key, ours in {**_QUIET, **_PATIENT, "transport/unicast/open_timeout": _OPEN_MS}.items():
         if not _differs(config, key):
             _set(config, key, ours)
     if connect:
