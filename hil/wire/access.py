@@ -156,9 +156,12 @@ def keys_said(scenario: Scenario, role: Role, *, guarded: bool) -> tuple[str, ..
 def _rules(layout: KeyLayout, role: Role, access: Access) -> list[dict[str, Any]]:
     """Rules of a role. What it says, others are told of, and what others hear, it is told of."""
     said, heard = _keys(layout, access.says), _keys(layout, access.hears)
-    tokens = [node_tokens(layout)] if access.says or access.hears else []
-    tokens += [topic_tokens(layout, topic, publishes=True) for topic in sorted(access.says)]
-    tokens += [topic_tokens(layout, topic, publishes=False) for topic in sorted(access.hears)]
+    tokens: list[str] = []
+    # Who only looks on does not show: it would pass for a robot that listens.
+    if access.says:
+        tokens.append(node_tokens(layout))
+        tokens += [topic_tokens(layout, topic, publishes=True) for topic in sorted(access.says)]
+        tokens += [topic_tokens(layout, topic, publishes=False) for topic in sorted(access.hears)]
     seen = [all_tokens(layout)]
     return [
         _rule(f"{role} says", ("put",), "ingress", said),
