@@ -28,6 +28,7 @@ def command(secure: Path | None, listen: str | None, zenoh_config: Path | None, 
 
     from hil.live.daemon import Ending
     from hil.wire.access import ROUTER
+    from hil.wire.link_watch import links_said
     from hil.wire.role_keys import RoleKeys
     from hil.wire.session import Endpoints, NoRouterError, close_session, open_session, refuse_deaf
 
@@ -48,8 +49,13 @@ def command(secure: Path | None, listen: str | None, zenoh_config: Path | None, 
         raise UsageError(str(error)) from None
     try:
         how = f"by the keys of {secure}" if secure else "open to all who reach it"
-        click.echo(f"abreast router: ready, {endpoints.describe()}, {how}", err=True)
-        while not ending.asked:
-            asked.wait(_LONGEST_WAIT_S)
+        with links_said(session, _say):
+            _say(f"ready, {endpoints.describe()}, {how}")
+            while not ending.asked:
+                asked.wait(_LONGEST_WAIT_S)
     finally:
         close_session(session)
+
+
+def _say(line: str) -> None:
+    click.echo(f"abreast router: {line}", err=True)

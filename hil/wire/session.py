@@ -117,6 +117,11 @@ def open_session(
     :class:`GaveUpError` where it was given up.
     """
     config = session_config(endpoints)
+    if endpoints.config_file is not None and not (connects_to(config) or listens_at(config)):
+        raise UsageError(
+            f"zenoh {endpoints.config_file}: it names nobody to connect to, expected "
+            'connect: { endpoints: ["tcp/127.0.0.1:7447"] } or the like'
+        )
     deadline = time.monotonic() + patience
     error: zenoh.ZError | None = None
     while True:
@@ -153,11 +158,6 @@ def session_config(endpoints: Endpoints) -> zenoh.Config:
     except zenoh.ZError as error:
         whose = endpoints.keys.config if endpoints.keys else endpoints.describe()
         raise UsageError(f"zenoh {whose}: {_told(error)}; give an endpoint like tcp/127.0.0.1:7447") from None
-    if endpoints.config_file is not None and not (connects_to(config) or listens_at(config)):
-        raise UsageError(
-            f"zenoh {endpoints.config_file}: it names nobody to connect to, expected "
-            'connect: { endpoints: ["tcp/127.0.0.1:7447"] } or the like'
-        )
     return config
 
 

@@ -103,7 +103,7 @@ def test_keys_are_not_replaced_unless_that_is_asked_for(tmp_path: Path) -> None:
 
 def test_a_folder_with_something_else_in_it_is_left_alone_even_by_force(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(UsageError, match="thesis.tex"):
+    with pytest.raises(UsageError, match=r"thesis\.tex"):
         make_keys(tmp_path, Deployment(TURTLEBOT3), now=NOW, replacing=True)
     assert [each.name for each in tmp_path.iterdir()] == ["thesis.tex"]
     with pytest.raises(UsageError, match="is no folder"):
