@@ -29,4 +29,4 @@ def links_said(session: zenoh.Session, say: Say) -> Iterator[None]:
         yield
     finally:
         # A session does not close while one listens.
-        listener.undeclare()
+        listener.undeclare()  # type: ignore[no-untyped-call]

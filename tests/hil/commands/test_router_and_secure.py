@@ -101,9 +101,6 @@ def test_keys_are_made_used_and_told_apart(tmp_path: Path) -> None:
 def test_ctrl_c_while_nobody_answers_ends_quietly_with_130(command: tuple[str, ...]) -> None:
     with reserved_endpoint() as nobody:
         arguments = [sys.executable, "-m", "hil", *command, "--connect", nobody]
-        if command[0] == "status":
-            # It waits for three seconds only: let it be asked for while it starts, or waits.
-            arguments += ["--once"]
         process = subprocess.Popen(arguments, stderr=subprocess.PIPE, text=True)
         try:
             process.wait(2.0)

@@ -53,6 +53,11 @@ def heard_by(wire: Wire, wanted: set[tuple[str, bytes]]) -> set[tuple[str, bytes
     return heard
 
 
+def is_listened_to(publisher: zenoh.Publisher) -> bool:
+    # Zenoh's stubs take the status for the answer itself.
+    return bool(publisher.matching_status.matching)  # type: ignore[attr-defined]
+
+
 def all_topics(scenario: Scenario) -> set[str]:
     given = access_of(scenario, guarded=True).values()
     return {topic for each in given for topic in each.says | each.hears}
@@ -123,7 +128,7 @@ def test_a_viewer_reaches_nobody_by_puts_deletes_and_wildcards(plain: TlsLab, mo
                 viewer.delete(wild)
             time.sleep(SILENCE_S / 3)
         # The only sign of it that Zenoh gives: nobody seems to listen.
-        assert not any(publisher.matching_status.matching for publisher in publishers)
+        assert not any(map(is_listened_to, publishers))
     # Not because nobody would have heard it.
     guard = plain.wire("guard", TURTLEBOT3)
     deadline = time.monotonic() + PATIENCE
@@ -132,7 +137,7 @@ def test_a_viewer_reaches_nobody_by_puts_deletes_and_wildcards(plain: TlsLab, mo
         time.sleep(0.02)
     assert set(heard) == {"follower/cmd_vel"}
     for subscriber in subscribers:
-        subscriber.undeclare()
+        subscriber.undeclare()  # type: ignore[no-untyped-call]
 
 
 def test_a_controllers_wildcard_does_not_reach_further_than_the_controller(plain: TlsLab) -> None:
@@ -208,7 +213,7 @@ def test_a_viewer_does_not_pass_for_a_robot_that_listens(plain: TlsLab) -> None:
             time.sleep(0.02)
         time.sleep(SILENCE_S)
         assert [(each.key, each.publishes) for each in operator.graph()] == [("follower/cmd_vel", False)]
-        held.undeclare()
+        held.undeclare()  # type: ignore[no-untyped-call]
 
 
 @pytest.mark.parametrize("name", ["turtlebot3", "chain5"])
