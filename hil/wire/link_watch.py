@@ -17,7 +17,7 @@ def links_said(session: zenoh.Session, say: Say) -> Iterator[None]:
     Whoever is refused gets no link and is not said: that is in Zenoh's own log only, which the variable
     ``RUST_LOG`` brings to stderr (``RUST_LOG=zenoh_link_tls=warn``).
     """
-    zenoh.try_init_log_from_env()
+    zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]
 
     def tell(event: zenoh.LinkEvent) -> None:
         how = "came" if event.kind == zenoh.SampleKind.PUT else "went"
