@@ -34,10 +34,10 @@ from estimation.own_motion.own_track import OwnPoint
 from estimation.tracking.estimate import Estimate
 from estimation.tracking.track_point import TrackPoint
 from estimation.tracking.tracker import TRACKING
-from formation.angles import wrapped
 from formation.kernel import entry
 from formation.pose import Pose
 from formation.records import Rows, borrowed, columns_of, load, row_of, rows_of, size, store
+from formation.wrapping import wrapped
 from hil.nodes import estimator_step
 from hil.nodes.estimator_desk import NOTHING_KNOWN
 from hil.nodes.estimator_memory import rules_of

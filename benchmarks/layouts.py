@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from formation.byte_access import read_float, write_float
 from formation.kernel import entry
-from formation.records import Buffer, Indices, Rows, Vector, borrowed, load, read_float, store, write_float
+from formation.records import Buffer, Indices, Rows, Vector, borrowed, load, store
 from hil.wire import command_layout, estimate_layout, frame_layout, odometry_layout
 from hil.wire.cdr import STAMP_BYTES, aligned, write_placement
 from hil.wire.message_checks import is_estimate

@@ -15,12 +15,12 @@ import numpy as np
 
 from controllers.laws import LawSettings, law
 from controllers.limits import limited
-from formation.angles import wrapped
 from formation.kernel import entry, kernel
 from formation.leader import Program, TableRow, driven
 from formation.line import Line
 from formation.records import Matrix, Rows, Tensor, Vector, borrowed
 from formation.trig import sine_and_cosine
+from formation.wrapping import wrapped
 
 _MOST_STEPS = 20_000_000
 _SAFETY, _LEAST_FACTOR, _MOST_FACTOR = 0.9, 0.2, 5.0

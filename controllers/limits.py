@@ -31,6 +31,18 @@ def is_beyond(wanted: Motion, v_max: float, u_max: float) -> bool:
     return abs(wanted.v) > v_max or abs(wanted.u) > u_max
 
 
+@kernel
+def approached(wanted: Motion, before: Motion, v_step: float, u_step: float) -> Motion:
+    """Wanted motion, but no further from the one before than a step of speed [m/s] and of turn rate [rad/s].
+
+    Steps are not negative; an infinite one limits nothing.
+
+    >>> approached(Motion(0.2, -1.0), Motion(0.1, 0.0), 0.05, math.inf)
+    Motion(v=0.15000000000000002, u=-1.0)
+    """
+    return Motion(before.v + clip(wanted.v - before.v, v_step), before.u + clip(wanted.u - before.u, u_step))
+
+
 @dataclass(frozen=True, slots=True)
 class Limits:
     """Symmetric limits |v| <= v_max [m/s] and |u| <= u_max [rad/s].

@@ -18,12 +18,12 @@ import math
 from typing import NamedTuple
 
 from controllers.laws import Gains, LawSettings, law
-from formation.angles import wrapped
 from formation.kernel import kernel
 from formation.line import Line
 from formation.pose import Motion
 from formation.spacing import lyapunov_at
 from formation.station import Side, Station
+from formation.wrapping import wrapped
 
 SLACK = 0.3
 """Error [rho_0] beyond which the phase waits; from half of it on it slows down."""

@@ -13,7 +13,7 @@ from numba.core.typing.templates import AttributeTemplate, Signature, bound_func
 from numba.extending import infer_getattr, lower_builtin, type_callable
 from numba.np.arrayobj import populate_array
 
-from formation import records
+from formation import byte_access, records
 
 _SCALARS: dict[Any, Any] = {float: types.float64, int: types.int64, bool: types.boolean}
 BYTES = types.Bytes(types.uint8, 1, "C", readonly=True)
@@ -254,20 +254,20 @@ def _teach_write(function: Any, width: int, kind: Any) -> None:
 
 
 def _teach_bytes() -> None:
-    _teach_read(records.read_float, 64, types.float64, signed=True)
-    _teach_read(records.read_int32, 32, types.int64, signed=True)
-    _teach_read(records.read_uint32, 32, types.int64, signed=False)
-    _teach_read(records.read_int64, 64, types.int64, signed=True)
-    _teach_read(records.read_byte, 8, types.int64, signed=False)
+    _teach_read(byte_access.read_float, 64, types.float64, signed=True)
+    _teach_read(byte_access.read_int32, 32, types.int64, signed=True)
+    _teach_read(byte_access.read_uint32, 32, types.int64, signed=False)
+    _teach_read(byte_access.read_int64, 64, types.int64, signed=True)
+    _teach_read(byte_access.read_byte, 8, types.int64, signed=False)
     _teach(
-        records.bytes_at,
+        byte_access.bytes_at,
         lambda source, at, length: typing_signature(BYTES, source, types.int64, types.int64),
         _bytes_at,
     )
-    _teach_write(records.write_float, 64, types.float64)
-    _teach_write(records.write_int32, 32, types.int64)
-    _teach_write(records.write_int64, 64, types.int64)
-    _teach_write(records.write_byte, 8, types.int64)
+    _teach_write(byte_access.write_float, 64, types.float64)
+    _teach_write(byte_access.write_int32, 32, types.int64)
+    _teach_write(byte_access.write_int64, 64, types.int64)
+    _teach_write(byte_access.write_byte, 8, types.int64)
 
 
 # Named tuples: x._replace(field=value), and methods

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from formation.angles import wrapped
 from formation.kernel import kernel
 from formation.pose import Pose
+from formation.wrapping import wrapped
 
 
 class Mount(NamedTuple):

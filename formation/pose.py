@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from formation.angles import wrapped
 from formation.kernel import kernel
+from formation.wrapping import wrapped
 
 
 class Pose(NamedTuple):

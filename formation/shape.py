@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from formation.angles import wrapped
 from formation.kernel import kernel
 from formation.pose import Motion, Pose
+from formation.wrapping import wrapped
 
 ABREAST_ALPHA1 = -0.5 * math.pi
 ABREAST_ALPHA2 = 0.5 * math.pi

@@ -25,6 +25,8 @@ COMMANDS = {
     "doctor": "what is wrong in a lab before anything moves, and what to do about it",
     "status": "daemons, bodies and robots of a lab, live",
     "stop": "stop all robots of a lab",
+    "arm": "let robots be driven again that their guards hold",
+    "guard": "the guard of a robot, between the wire and its driver, as a daemon",
     "emulator": "the emulated robots and motion capture, as a daemon",
     "follower": "estimator and controller in one process, as a daemon",
     "estimator": "the estimator, as a daemon",
@@ -69,7 +71,7 @@ def abreast() -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the console script and exit: 0 done, 1 a check failed, 2 bad usage or bad input."""
+    """Run the console script and exit: 0 done, 1 a check failed, 2 bad usage or bad input, 130 Ctrl-C."""
     try:
         code = abreast.main(
             args=None if arguments is None else list(arguments), prog_name="abreast", standalone_mode=False

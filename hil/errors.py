@@ -1,5 +1,7 @@
 """The one exception tree of abreast."""
 
+import signal
+
 
 class AbreastError(Exception):
     """Root of all errors that abreast raises on purpose; its text is one line for the user."""
@@ -32,3 +34,11 @@ class CheckFailedError(AbreastError):
     ...     print(error)
     the start barrier did not open within 10 s of simulated time; a follower gets no frames ...
     """
+
+
+class InterruptedRunError(AbreastError):
+    """A run was ended by a signal before its time. Exit code 130 for Ctrl-C in its terminal, else 1."""
+
+    def __init__(self, text: str, number: int) -> None:
+        super().__init__(text)
+        self.exit_code = 130 if number == signal.SIGINT else 1

@@ -33,9 +33,8 @@ ROOMS = {
         "models", "own_motion", "time", "filters", "tracking", "bounds", "consistency", "calibration",
     ),
     "hil": (
-        "extensions", "scenario", "wire", "log", "nodes", "emulator", "lockstep", "live", "bridge", "doctor",
-        "replay",
-        "recordings", "judge", "figures", "reports", "sweep", "simulate", "commands",
+        "extensions", "scenario", "wire", "guard", "log", "nodes", "emulator", "lockstep", "live", "bridge",
+        "doctor", "replay", "recordings", "judge", "figures", "reports", "sweep", "simulate", "commands",
     ),
 }  # fmt: skip
 """Rooms of the packages that have some, lower ones first: each may import those before it."""

@@ -11,10 +11,12 @@ import zenoh
 
 from hil.live.tls_keys import Deployment, make_keys
 from hil.scenario.files import load_scenario
+from hil.scenario.guarded import with_guards
 from hil.scenario.schema import Scenario
-from hil.wire.access import ROUTER, Role, access_layout
+from hil.wire.key_layout import layout_of
 from hil.wire.pubsub import Wire
 from hil.wire.role_keys import RoleKeys
+from hil.wire.roles import ROUTER, Role
 from hil.wire.session import Endpoints, allowed_keys, close_session, open_session, reserved_endpoint
 
 NOW = datetime.datetime.now(datetime.UTC)
@@ -23,8 +25,8 @@ PATIENCE = 60.0
 
 def lab_keys(folder: Path, *overrides: str, guarded: bool = True) -> Scenario:
     """Make keys for a scenario, and give it."""
-    scenario = load_scenario("turtlebot3", overrides)
-    make_keys(folder, Deployment(scenario, guarded=guarded), now=NOW)
+    scenario = with_guards(load_scenario("turtlebot3", overrides), present=guarded)
+    make_keys(folder, Deployment(scenario), now=NOW)
     return scenario
 
 
@@ -45,7 +47,7 @@ class TlsLab:
         """A wire of a role; one that is not ``strict`` tries to publish what its keys do not allow."""
         keys = RoleKeys(self.folder, role)
         allowed = allowed_keys(Endpoints(connect=self.endpoint, keys=keys)) if strict else None
-        wire = Wire(self.session(role), layout=access_layout(scenario), node=role, allowed=allowed)
+        wire = Wire(self.session(role), layout=layout_of(scenario), node=role, allowed=allowed)
         self._held.callback(wire.close)
         return wire
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from formation.angles import wrapped
 from formation.kernel import kernel
 from formation.spacing import Spacing, restoring
 from formation.station import ABREAST, Station
+from formation.wrapping import wrapped
 
 
 class Moment(NamedTuple):

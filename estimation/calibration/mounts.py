@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from estimation.calibration.smoothed_track import LocalFit, fitted_rates
 from estimation.models.measurement import PoseNoise
 from estimation.tracking.mount_check import NO_MOUNT_CHECK, mount_checked, mount_left
-from formation.angles import FloatArray, wrap, wrapped
+from formation.angles import FloatArray, wrap
 from formation.mount import Mount
 from formation.pose import Pose
+from formation.wrapping import wrapped
 
 LEAST_S = 3.0
 """Seconds of motion that a mount rests on at least."""

@@ -24,9 +24,9 @@ from typing import NamedTuple
 from estimation.consistency.noise_level import AS_TOLD, Innovation, Level, certain_scale, learned
 from estimation.models.measurement import PairSeen, PoseNoise
 from estimation.tracking.track_point import GATED, RESTARTED, TrackPoint
-from formation.angles import wrapped
 from formation.kernel import kernel
 from formation.pose import Pose
+from formation.wrapping import wrapped
 
 REFUTED = 1.3
 """Scale above which what was told is refuted."""

@@ -14,8 +14,8 @@ from typing import NamedTuple
 from estimation.filters.gaussian import Gaussian, Rates, started
 from estimation.models.coordinated_turn import LeaderLimits, Spread
 from estimation.models.measurement import Measurement
-from formation.angles import wrapped
 from formation.kernel import kernel
+from formation.wrapping import wrapped
 
 
 class Polar(NamedTuple):

@@ -14,10 +14,10 @@ import numpy as np
 
 from estimation.models.coordinated_turn import FollowerMotion, Spread
 from estimation.models.motion import Matrix, Vector
-from formation.angles import wrapped
 from formation.arc import small_turn
 from formation.kernel import kernel
 from formation.pose import Pose
+from formation.wrapping import wrapped
 
 NO_MOTION = FollowerMotion(0.0, 0.0, 0.0, 0.0)
 

@@ -19,11 +19,11 @@ from estimation.own_motion.odometry_check import (
 from estimation.own_motion.odometry_delay import delay_of, misfit_of, tight_variances
 from estimation.own_motion.odometry_history import InputTrust
 from estimation.own_motion.own_track import OwnNoise, OwnPoint, motion_of, own_place, own_point
-from formation.angles import wrapped
 from formation.kernel import kernel
 from formation.pose import Pose
 from formation.records import Rows
 from formation.ring import Ring
+from formation.wrapping import wrapped
 
 _APART = 0.3  # [s]; two poses further apart tell nothing of the moment in between
 _DOUBTS = 9.21  # chi-square quantile of 0.99 with 2 degrees of freedom, of a mean: far above any healthy one

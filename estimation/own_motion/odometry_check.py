@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 from estimation.own_motion.odometry_history import InputTrust
 from estimation.own_motion.own_track import OwnNoise
-from formation.angles import wrapped
 from formation.kernel import kernel
 from formation.pose import Pose
 from formation.records import Rows, load, size, store
 from formation.ring import EMPTY, Ring, place
+from formation.wrapping import wrapped
 
 WINDOW = 0.5
 """Length [s] over which motion is averaged: mocap noise is then far below what a driven robot does."""

@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import PoseNoise
-from formation.angles import wrapped
 from formation.arc import swing
 from formation.kernel import kernel
 from formation.pose import Pose
 from formation.records import Rows, load, size, store
 from formation.ring import Ring, place
+from formation.wrapping import wrapped
 
 TRACK_CORRELATION = 0.001
 """Correlation time [s] of the errors of v and u out of a track.

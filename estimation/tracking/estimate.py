@@ -13,8 +13,8 @@ from estimation.models.coordinated_turn import FollowerMotion, Push
 from estimation.models.measurement import Measurement
 from estimation.models.motion import Matrix
 from estimation.tracking.track_point import JumpUncertainty, TrackPoint
-from formation.angles import wrapped
 from formation.kernel import kernel
+from formation.wrapping import wrapped
 
 QUANTITIES = ("rho_dot", "alpha2_dot", "v1", "alpha1", "u1")
 GUESSED = math.pi * math.pi / 3.0

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 from estimation.models.coordinated_turn import FollowerMotion
 from estimation.models.measurement import Measurement, PairSeen, PoseNoise
-from formation.angles import wrapped
 from formation.kernel import kernel
 from formation.pose import Pose, advance
+from formation.wrapping import wrapped
 
 _SCALE = 0.1  # share of a motion by which slip and wheel sizes may falsify it
 

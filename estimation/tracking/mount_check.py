@@ -12,9 +12,9 @@ import math
 from typing import NamedTuple
 
 from estimation.models.measurement import PoseNoise
-from formation.angles import wrapped
 from formation.kernel import kernel
 from formation.pose import Pose
+from formation.wrapping import wrapped
 
 _NS = 1e-9
 _ARC_NS = 250_000_000

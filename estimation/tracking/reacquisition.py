@@ -10,8 +10,8 @@ from estimation.models.coordinated_turn import mean_motion
 from estimation.models.measurement import Measurement, way_between
 from estimation.tracking.follower_check import FollowerCheck, carried, check_from, misfit
 from estimation.tracking.track_point import JumpUncertainty, TentativeTrack
-from formation.angles import wrapped
 from formation.kernel import kernel
+from formation.wrapping import wrapped
 
 _NS = 1e-9
 

@@ -8,13 +8,15 @@ from typing import Any
 import click
 
 from formation.collector import collector_paused
-from hil.commands.daemon_workers import WORKERS, Order, overheard, serve_alone, watch_of
+from hil.commands.daemon_workers import WORKERS, Order, on_report, overheard, serve_alone, watch_of
+from hil.commands.guard_option import NO_GUARD
 from hil.commands.natnet_options import NatNetOptions, natnet_options
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION, Seconds
 from hil.commands.wire_options import endpoints_of, wire_options
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario
+from hil.scenario.guarded import with_guards
 from hil.scenario.links import HOSTED, link_of, links_of
 
 
@@ -36,6 +38,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         certify: bool = False,
         countdown: float = 0.0,
         by_hand: bool = False,
+        no_guard: bool = False,
         **natnet: Any,
     ) -> None:
         # Wire and messages take a third of a second to load, which help needs not.
@@ -51,6 +54,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         options = NatNetOptions(**natnet)
         alone = options.natnet and not (connect or listen or zenoh_config or secure)
         chosen = load_scenario(scenario, (*overrides, CERTIFY) if certify else overrides)
+        chosen = with_guards(chosen, present=not no_guard)
         if name in HOSTED:
             load_own_parts(chosen, estimates=name != "controller")
         needed = frozenset(filter(None, needs.split(",")))
@@ -73,7 +77,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
             ending,
             duration,
             say_ready,
-            Presence(name, watch_of(name, order), overheard(name, order)),
+            Presence(name, watch_of(name, order), overheard(name, order), on_report()),
         )
         if dropped:
             click.echo(f"abreast {name}: {dropped} messages came too fast and were dropped", err=True)
@@ -83,6 +87,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         click.Argument(["scenario"]),
         *wire_options(),
         click.Option(["--duration"], type=DURATION, help="End after S seconds."),
+        click.Option(["--no-guard"], is_flag=True, help=NO_GUARD),
         click.Option(["--tethered"], is_flag=True, hidden=True),
     ]
     if name == "recorder":

@@ -48,10 +48,10 @@ def _leader(order: Order) -> Worker:
     from hil.nodes.link_nodes import leader_standstill
 
     if order.by_hand:
-        return NodeWorker([LeaderWatch(order.scenario, order.needs)], on_report=_on_report())
+        return NodeWorker([LeaderWatch(order.scenario, order.needs)], on_report=on_report())
     driver = LeaderDriver(order.scenario, order.needs, order.countdown_s)
     parting = Parting("the leader ended", lambda now_ns: [leader_standstill(order.scenario, now_ns)])
-    return NodeWorker([driver], parting=parting, on_report=_on_report())
+    return NodeWorker([driver], parting=parting, on_report=on_report())
 
 
 def _emulator(order: Order) -> Worker:
@@ -67,14 +67,14 @@ def _emulator(order: Order) -> Worker:
     if order.natnet.natnet:
         from hil.bridge.natnet_emulator import NatNetEmulator
 
-        emulator = NatNetEmulator(node, order.natnet.serving(), on_report=_on_report())
+        emulator = NatNetEmulator(node, order.natnet.serving(), on_report=on_report())
         click.echo(f"abreast emulator: serves {served(emulator, order.natnet.natnet_address)}", err=True)
         return emulator
     if not converts(order.scenario):
-        return NodeWorker([node], on_report=_on_report())
+        return NodeWorker([node], on_report=on_report())
     frames = (topics.RIGID_BODIES,)
     foreign = ForeignMocapNode(order.scenario)
-    return NodeWorker([node, foreign], within=frames, on_report=_on_report(), unspoken=frames)
+    return NodeWorker([node, foreign], within=frames, on_report=on_report(), unspoken=frames)
 
 
 def _beside_real(order: Order) -> Worker:
@@ -84,7 +84,7 @@ def _beside_real(order: Order) -> Worker:
 
     source, robot = SourceNode(order.scenario, LAB_FRAMES), BesideReal(order.scenario, order.needs)
     nodes: list[Node[Any]] = [source, robot]
-    return NodeWorker(nodes, within=(LAB_FRAMES,), on_report=_on_report(), unspoken=(LAB_FRAMES,))
+    return NodeWorker(nodes, within=(LAB_FRAMES,), on_report=on_report(), unspoken=(LAB_FRAMES,))
 
 
 def serve_alone(order: Order, ending: Ending, duration_s: float | None) -> None:
@@ -105,7 +105,7 @@ def _estimator(order: Order) -> Worker:
     return NodeWorker(
         [*source, *map(estimator_node, order.links)],
         within=frames_within(source),
-        on_report=_on_report(),
+        on_report=on_report(),
     )
 
 
@@ -118,7 +118,7 @@ def _controller(order: Order) -> Worker:
         controllers,
         parting=_parting("controller", order),
         after_tick=remarks_on({node.law for node in controllers}),
-        on_report=_on_report(),
+        on_report=on_report(),
     )
 
 
@@ -133,11 +133,11 @@ def _follower(order: Order) -> Worker:
         within=[*frames_within(source), *(node.topics.estimate for node in controllers)],
         parting=_parting("follower", order),
         after_tick=remarks_on({node.law for node in controllers}),
-        on_report=_on_report(),
+        on_report=on_report(),
     )
 
 
-def _on_report() -> Callable[[bytes], None]:
+def on_report() -> Callable[[bytes], None]:
     """What says on stderr what nodes find and wait for, once when it begins and once when it ends."""
     from hil.live.finding_lines import FindingLines, ProblemLines
 
@@ -160,13 +160,14 @@ def watch_of(name: str, order: Order) -> Callable[[Wire], ListenerWatch] | None:
     from hil.wire.topics import link_topics
 
     named = [(link.node_name("listeners"), link_topics(link)) for link in order.links]
-    robots = [Commanded(node, each.cmd_vel, each.odom) for node, each in named]
+    robots = [Commanded(node, each.cmd_vel, each.odom, each.wanted) for node, each in named]
     if name == "leader" and not order.by_hand:
         first = named[0][1]
-        robots = [Commanded("leader_listeners", first.leader_cmd_vel, first.leader_odom)]
+        told = first.leader_cmd_vel, first.leader_odom, first.leader_wanted
+        robots = [Commanded("leader_listeners", *told)]
     elif name not in ("follower", "controller"):
         return None
-    return lambda wire: ListenerWatch(wire, layout_of(order.scenario), robots, _on_report())
+    return lambda wire: ListenerWatch(wire, layout_of(order.scenario), robots, on_report())
 
 
 def overheard(name: str, order: Order) -> frozenset[str]:
@@ -174,7 +175,7 @@ def overheard(name: str, order: Order) -> frozenset[str]:
     from hil.wire.topics import link_topics
 
     if name == "leader" or (name == "emulator" and order.scenario.source.emulated == "leader"):
-        return frozenset(link_topics(link).cmd_vel for link in order.links)
+        return frozenset(link_topics(link).wanted for link in order.links)
     return frozenset()
 
 

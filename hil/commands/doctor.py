@@ -48,8 +48,9 @@ def command(
     with collector_paused():
         from hil.doctor.machine_checks import disk_check
         from hil.scenario.files import load_scenario
+        from hil.scenario.guarded import with_guards
 
-    chosen = load_scenario(scenario, overrides)
+    chosen = with_guards(load_scenario(scenario, overrides))
     findings: list[dict[str, Any]] = []
     endpoints = endpoints_of(connect, listen, zenoh_config, secure, "operator")
     checks = [disk_check(out), *_visited(chosen, endpoints, duration, drive, findings)]

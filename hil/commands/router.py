@@ -27,9 +27,9 @@ def command(secure: Path | None, listen: str | None, zenoh_config: Path | None, 
     import threading
 
     from hil.live.daemon import Ending
-    from hil.wire.access import ROUTER
     from hil.wire.link_watch import links_said
     from hil.wire.role_keys import RoleKeys
+    from hil.wire.roles import ROUTER
     from hil.wire.session import Endpoints, NoRouterError, close_session, open_session, refuse_deaf
 
     if listen and zenoh_config:

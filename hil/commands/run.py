@@ -12,16 +12,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from formation.collector import collector_paused
+from hil.commands.guard_option import NO_GUARD
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION, Seconds
 from hil.commands.wire_options import DEFAULT_ENDPOINT, SECURE_ENDPOINT
-from hil.errors import CheckFailedError, UsageError
+from hil.errors import CheckFailedError, InterruptedRunError, UsageError
 from hil.judge.made_by import law_failure
 from hil.live.crew import Crew
 from hil.log.report_json import print_json, results_apart
 from hil.reports.judged_log import claimed, judge_log, made_folder
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario, refuse_unrunnable
+from hil.scenario.guarded import with_guards
 from hil.scenario.links import chain_of, links_of, refuse_chain
 from hil.scenario.schema import Scenario
 
@@ -58,6 +60,7 @@ if TYPE_CHECKING:
     help="Who drives a real leader: its program, after a countdown [program], or a hand.",
 )
 @click.option("--countdown", type=Seconds(0.0), help="Seconds from when all are ready to the start [3].")
+@click.option("--no-guard", is_flag=True, help=NO_GUARD)
 @click.option(
     "--listen",
     metavar="ENDPOINT",
@@ -108,6 +111,7 @@ def command(
     chosen = load_scenario(scenario, [*overrides, *options, *([CERTIFY] if certify else [])])
     refuse_unrunnable(chosen)
     links_of(chosen)
+    chosen = with_guards(chosen, present=how is not None and how.crew.guarded)
     if how is not None and (emulated := chosen.source.emulated):
         refuse_chain(chosen, "--emulate is for a pair: leave it out")
         how = replace(how, crew=replace(how.crew, emulate=emulated))
@@ -133,6 +137,7 @@ def _how(
     emulate: str | None,
     driven_by: str | None,
     countdown: float | None,
+    no_guard: bool,
     listen: str | None,
     connect: str | None,
     zenoh_config: Path | None,
@@ -142,8 +147,9 @@ def _how(
 
     Raises :class:`UsageError` for options that exclude each other.
     """
-    if lockstep and (apart or real or secure):
-        option = "--apart" if apart else "--real" if real else "--secure"
+    apart_from_one = {"--apart": apart, "--real": real, "--no-guard": no_guard, "--secure": secure}
+    option = next((each for each, given in apart_from_one.items() if given), "")
+    if lockstep and option:
         raise UsageError(
             f"{option}: a run in lockstep is one process; leave one of {option} and --lockstep out"
         )
@@ -161,9 +167,16 @@ def _how(
     if lockstep:
         return None
     by_hand = driven_by == "hand"
-    crew = Crew(apart=apart, real=real, emulate=emulate or "", by_hand=by_hand, countdown_s=countdown)
-    from hil.wire.access import OPERATOR, ROUTER
+    crew = Crew(
+        apart=apart,
+        real=real,
+        emulate=emulate or "",
+        by_hand=by_hand,
+        countdown_s=countdown,
+        guarded=not no_guard,
+    )
     from hil.wire.role_keys import RoleKeys
+    from hil.wire.roles import OPERATOR, ROUTER
     from hil.wire.session import Endpoints
 
     keys = RoleKeys(secure, OPERATOR if connect else ROUTER) if secure else None
@@ -178,12 +191,12 @@ def _run(chosen: Scenario, folder: Path, live: _Live | None, *, as_json: bool) -
     log_path = folder / "run.mcap"
     if log_path.exists():
         raise UsageError(f"{log_path} exists already; give another --out, or move it away")
-    failure, left, timing = "", "", {}
+    failure, left, interrupted, timing = "", "", "", {}
     if live is None:
         timing = {"lockstep": _lockstep(chosen, log_path)}
     else:
         outcome = _live(chosen, log_path, live)
-        failure, left = outcome.failure, f"{outcome.robots}, "
+        failure, left, interrupted = outcome.failure, f"{outcome.robots}, ", _interrupted(outcome)
     if not log_path.exists():
         raise CheckFailedError(failure or "interrupted before anything was recorded")
     try:
@@ -198,6 +211,15 @@ def _run(chosen: Scenario, folder: Path, live: _Live | None, *, as_json: bool) -
         # Also if there is no room for a verdict, say: what went wrong first is what to tell.
         if failure:
             raise CheckFailedError(f"the run broke down: {failure}; {left}the log is {log_path}")
+    if interrupted:
+        raise InterruptedRunError(interrupted, outcome.signal)
+
+
+def _interrupted(outcome: Outcome) -> str:
+    """That a run was interrupted, in words; empty if it was not."""
+    if not outcome.interrupted:
+        return ""
+    return f"interrupted after {outcome.duration_s:.1f} s; {outcome.robots}, the log is whole"
 
 
 def _folder(scenario: Scenario, out: Path | None) -> Path:
@@ -257,10 +279,6 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> Outcome:
             outcome = run_live(scenario, log_path, endpoints, ending, show, live.crew)
         finally:
             ending.leave_signals()
-    if outcome.interrupted:
-        # Names may look like markup.
-        said = f"interrupted after {outcome.duration_s:.1f} s; {outcome.robots}, the log is whole"
-        console.print(Text(said), soft_wrap=True)
     return outcome
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from hil.commands.guard_option import NO_GUARD
 from hil.errors import UsageError
 
 
@@ -21,7 +22,7 @@ def command() -> None:
 @click.option(
     "--host", "hosts", multiple=True, metavar="NAME", help="Where the router is reached; may be given again."
 )
-@click.option("--no-guard", is_flag=True, help="Without guards: controllers tell robots what to drive.")
+@click.option("--no-guard", is_flag=True, help=NO_GUARD)
 @click.option(
     "--days", type=click.IntRange(1, 3650), default=825, show_default=True, help="How long they are valid."
 )
@@ -43,7 +44,8 @@ def init(
     A machine needs ca.pem and the files of the roles that it has. Whoever has the key of a role has the role.
     """
     from hil.scenario.files import load_scenario
-    from hil.wire.access import ROLES
+    from hil.scenario.guarded import with_guards
+    from hil.wire.roles import ROLES
 
     try:
         from hil.live.tls_keys import Deployment, make_keys
@@ -51,9 +53,9 @@ def init(
         raise UsageError(
             f"abreast secure: {error.name} is not installed; pip install 'abreast[secure]'"
         ) from None
-    chosen = load_scenario(scenario, overrides)
+    chosen = with_guards(load_scenario(scenario, overrides), present=not no_guard)
     now = datetime.datetime.now(datetime.UTC)
-    wanted = Deployment(chosen, hosts, guarded=not no_guard, days=days)
+    wanted = Deployment(chosen, hosts, days)
     make_keys(folder, wanted, now=now, replacing=force)
     until = now + datetime.timedelta(days=days)
     click.echo(f"{folder}: keys of {', '.join(ROLES)} for {chosen.name}, valid until {until:%Y-%m-%d}")

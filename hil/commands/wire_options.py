@@ -39,8 +39,8 @@ def endpoints_of(
     connect: str | None, listen: str | None, zenoh_config: Path | None, secure: Path | None, role: str
 ) -> Endpoints:
     """Endpoints that were given, or the one on loopback where none was, for a command of a role."""
-    from hil.wire.access import ROLES
     from hil.wire.role_keys import RoleKeys
+    from hil.wire.roles import ROLES
     from hil.wire.session import Endpoints
 
     if not (connect or listen or zenoh_config):

@@ -9,9 +9,9 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from formation.angles import wrapped
 from formation.mount import robot_pose
 from formation.pose import Motion, Pose
+from formation.wrapping import wrapped
 from hil.doctor.check import Check, check
 from hil.doctor.evidence import Evidence
 from hil.nodes.findings import advice_on

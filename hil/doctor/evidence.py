@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from formation.pose import Motion, Pose
+from hil.live.guards_heard import GuardsHeard
 from hil.nodes.findings import Findings, findings_in
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
@@ -51,7 +52,8 @@ class Asked(NamedTuple):
 class Evidence:
     """All that was heard: frames, and odometry and commands by topic. ``unread``: how many made no sense.
 
-    ``reported``: what bridges find, who see what lies behind them and does not show on the wire.
+    ``reported``: what bridges find, who see what lies behind them and does not show on the wire. ``guards``:
+    what guards say of their robots.
     """
 
     scenario: Scenario
@@ -60,6 +62,7 @@ class Evidence:
     commands: dict[str, list[Asked]] = field(default_factory=dict)
     unread: dict[str, int] = field(default_factory=dict)
     reported: dict[str, Findings] = field(default_factory=dict)
+    guards: GuardsHeard = field(default_factory=GuardsHeard)
     robots: tuple[LabRobot, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -69,8 +72,12 @@ class Evidence:
     def topics(self) -> tuple[str, ...]:
         """What there is to hear."""
         robots = self.robots
-        driven = [topic for each in robots for topic in (each.odom, each.cmd_vel)]
-        return (topics.RIGID_BODIES, topics.DIAGNOSTICS, *driven)
+        driven = [topic for each in robots for topic in (each.odom, each.cmd_vel, each.wanted)]
+        return (topics.RIGID_BODIES, topics.DIAGNOSTICS, *dict.fromkeys(driven))
+
+    def commands_to(self, robot: LabRobot) -> str:
+        """The topic on which whoever drives a robot sends: to its guard, where one was heard."""
+        return robot.wanted if robot.name in self.guards.held else robot.cmd_vel
 
     def reported_findings(self) -> list[tuple[str, str]]:
         """Names of the findings that bridges have, and their texts behind the bridge's name."""
@@ -89,6 +96,7 @@ class Evidence:
             elif event.topic == topics.DIAGNOSTICS:
                 found = findings_in(decode_as(event.payload, msg.DiagnosticArray))
                 self.reported |= {node: each for node, each in found.items() if node.startswith(_BRIDGES)}
+                self.guards.hear(event.payload)
             elif event.topic in {each.odom for each in self.robots}:
                 rolled = _rolled(decode_as(event.payload, msg.Odometry), now_ns)
                 self.odometry.setdefault(event.topic, []).append(rolled)
@@ -96,6 +104,9 @@ class Evidence:
                 stamp_ns = 0
                 if self.scenario.controller.command_type == "TwistStamped":
                     stamp_ns = _stamp_ns(decode_as(event.payload, msg.TwistStamped).header)
+                self.commands.setdefault(event.topic, []).append(Asked(now_ns, stamp_ns))
+            elif event.topic in {each.wanted for each in self.robots}:
+                stamp_ns = _stamp_ns(decode_as(event.payload, msg.TwistStamped).header)
                 self.commands.setdefault(event.topic, []).append(Asked(now_ns, stamp_ns))
         except MalformedPayloadError:
             self.unread[event.topic] = self.unread.get(event.topic, 0) + 1

@@ -82,7 +82,7 @@ class Examination:
     def robot(self, name: str) -> LabRobot:
         """The robot of a name, a body or a namespace; :class:`UsageError` if there is none."""
         for robot in self.found.robots:
-            if name in (robot.name, robot.body, robot.cmd_vel.rpartition("/")[0]):
+            if name in (robot.name, robot.body, robot.namespace):
                 return robot
         known = ", ".join(robot.name for robot in self.found.robots)
         raise UsageError(
@@ -91,15 +91,21 @@ class Examination:
 
     def hindrance(self, robot: LabRobot) -> Check | None:
         """Why a robot is not to be driven now, if it is not: it cannot obey two."""
-        others = len(self.found.commands.get(robot.cmd_vel, [])) + self.found.unread.get(robot.cmd_vel, 0)
+        if text := self.found.guards.held.get(robot.name):
+            seen = f"{robot.name}: its guard holds it: {text}; it was not driven"
+            return Check("drive", False, seen, "a guard that lets it be driven", advice_on("guard_latched"))
+        topic = self.found.commands_to(robot)
+        others = len(self.found.commands.get(topic, [])) + self.found.unread.get(topic, 0)
         if not others:
             return None
-        seen = f"{robot.name}: {others} commands of somebody else on {robot.cmd_vel}; it was not driven"
+        seen = f"{robot.name}: {others} commands of somebody else on {topic}; it was not driven"
         return Check("drive", False, seen, "nobody else who commands it", advice_on("second_sender"))
 
     def drive(self, robot: LabRobot, tell: Tell) -> list[Check]:
         """Let a robot creep and turn, and check what came of it. It is told to stand however this ends."""
         try:
+            # A guard takes a sender that begins with a standstill.
+            tell(robot, STANDSTILL, REST_S)
             ahead = tell(robot, CREEP, CREEP_S)
             tell(robot, STANDSTILL, REST_S)
             around = tell(robot, TURN, TURN_S)

@@ -81,11 +81,12 @@ def _listener(
 
 def _one_sender(found: Evidence, robot: LabRobot, graph: Sequence[Endpoint], layout: KeyLayout) -> Check:
     """Whether at most one commands the robot: by the graph, or by stamps that run back and forth."""
-    told = layout.within(layout.name(robot.cmd_vel))
+    topic = found.commands_to(robot)
+    told = layout.within(layout.name(topic))
     senders = {each.session for each in graph if each.publishes and each.key == told}
-    asked = found.commands.get(robot.cmd_vel, [])
+    asked = found.commands.get(topic, [])
     mixed = len(senders) < 2 and _runs_back(asked)
-    seen = f"{robot.name}: {len(senders)} senders of {robot.cmd_vel} in the graph, {len(asked)} commands"
+    seen = f"{robot.name}: {len(senders)} senders of {topic} in the graph, {len(asked)} commands"
     if mixed:
         seen += ", whose stamps run back and forth"
     ok = len(senders) < 2 and not mixed

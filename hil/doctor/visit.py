@@ -63,7 +63,8 @@ class Visit:
         Raises :class:`StoppedError` where it is to move and somebody says stop, or asks for the end.
         """
         begun_ns, until = time.time_ns(), time.monotonic() + seconds
-        frame = robot.cmd_vel.rpartition("/")[0]
+        topic = self.examination.found.commands_to(robot)
+        stamped = self._stamped or topic != robot.cmd_vel
         while time.monotonic() < until:
             if motion != STANDSTILL and (self._stop or self.ending.asked):
                 why = (
@@ -72,7 +73,7 @@ class Visit:
                     else "the doctor was ended"
                 )
                 raise StoppedError(f"{robot.name} stands: {why}")
-            told = drive_message(motion, time.time_ns(), frame, stamped=self._stamped)
-            self._wire.publish(robot.cmd_vel, encode(told))
+            told = drive_message(motion, time.time_ns(), robot.namespace, stamped=stamped)
+            self._wire.publish(topic, encode(told))
             self.listen(_TICK_S)
         return begun_ns + round(REST_S * 1e9), time.time_ns()

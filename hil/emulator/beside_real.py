@@ -15,6 +15,7 @@ from hil.emulator.lab_messages import frame_message
 from hil.emulator.node import EmulatorNode, EmulatorState
 from hil.nodes.capture_time import captured_ns
 from hil.nodes.node import Counts, Outgoing, counted, diagnostics, named_counts, no_counts, outgoing
+from hil.scenario.guarded import with_guards
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
@@ -64,10 +65,17 @@ class BesideReal:
             clock_jump_s=0.0, faults=(),
         )  # fmt: skip
         waits = needs if self._robot == "leader" else frozenset({"nobody"})
-        self._node = EmulatorNode(changed(scenario, mocap=mocap), waits)
+        # A follower that is emulated has a guard of its own; one that exists has it outside.
+        guarded = scenario.guard.present and self._robot == "follower"
+        self._node = EmulatorNode(with_guards(changed(scenario, mocap=mocap), guarded), waits)
         pair = self._node.topics
-        own = (pair.leader_odom, pair.leader_cmd_vel) if self._robot == "leader" else (pair.odom,)
-        self._spoken = {*own, topics.DIAGNOSTICS, pair.side}
+        leads = self._robot == "leader"
+        own = (
+            (pair.leader_odom, pair.leader_cmd_vel)
+            if leads
+            else (pair.odom, *({pair.cmd_vel} if guarded else ()))
+        )
+        self._spoken = {*own, *([pair.cmd_vel] if guarded else []), topics.DIAGNOSTICS, pair.side}
         self.subscribes = (*self._node.subscribes, LAB_FRAMES)
 
     def begin(self, now_ns: int) -> BesideState:
@@ -111,7 +119,9 @@ class BesideReal:
                 motion = state.lab.robots[self._place].motion
                 state.shown.append(Shown(to_ns(frame.header.stamp), frame.rigidbodies[self._place], motion))
             elif message.topic == topics.DIAGNOSTICS:
-                yield self.report(state, message.stamp_ns)
+                (status,) = decode_as(message.payload, msg.DiagnosticArray).status
+                own = status.name == f"abreast/{self.name}"
+                yield self.report(state, message.stamp_ns) if own else message
             elif message.topic in self._spoken:
                 yield message
 

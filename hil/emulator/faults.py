@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from enum import IntEnum
 from typing import NamedTuple
 
-from formation.angles import wrapped
 from formation.kernel import kernel
 from formation.pose import Pose
 from formation.records import Rows, load, rows_of, size, store
+from formation.wrapping import wrapped
 from hil.scenario.emulated import FaultSection
 
 

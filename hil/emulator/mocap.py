@@ -12,10 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from formation.angles import FloatArray, wrapped
+from formation.angles import FloatArray
 from formation.kernel import kernel
 from formation.mount import NO_MOUNT, Mount, body_pose
 from formation.pose import Pose
+from formation.wrapping import wrapped
 from hil.emulator.robot import Robot
 
 _FULL_NOISE_SPEED = 0.05

@@ -6,10 +6,11 @@ run has one, recorder have reported that they are well, and a command has reache
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 
+from hil.emulator.guarded import EmulatedGuards
 from hil.emulator.lab_writer import LabWriter
 from hil.emulator.plant import Plant
 from hil.emulator.robot import Robot
@@ -36,6 +37,7 @@ class EmulatorState:
     """The lab, when its next thing is due, and what the node knows besides; it changes in place.
 
     ``present``: who is there for the start. ``orders``: how many orders to change sides were given.
+    ``guards``: those of the followers, where the scenario has them.
     """
 
     plant: Plant
@@ -44,6 +46,7 @@ class EmulatorState:
     refused: Counts = field(default_factory=no_counts)
     next_diagnostics_ns: int = 0
     orders: int = 0
+    guards: EmulatedGuards | None = None
 
     @property
     def motion_since_ns(self) -> int | None:
@@ -78,26 +81,30 @@ class EmulatorNode:
         self.writer = LabWriter(bodies, self.pairs)
         self.poses = chain_poses(scenario, len(bodies))
         self.orders = ordered_sides(scenario)
-        self._handlers: dict[str, Callable[[EmulatorState, bytes, int], None]] = {
-            **{pair.cmd_vel: partial(self._on_command, k) for k, pair in enumerate(self.pairs, start=1)},
+        self._links = links
+        take = self._on_wanted if scenario.guard.present else self._on_command
+        self._handlers: dict[str, Callable[[EmulatorState, Event, int], Iterable[Outgoing]]] = {
+            **{pair.wanted: partial(take, k) for k, pair in enumerate(self.pairs, start=1)},
             topics.STOP: self._on_stop,
             topics.DIAGNOSTICS: self._on_diagnostics,
+            **({topics.ARM: self._on_arm} if scenario.guard.present else {}),
         }
         self.subscribes = tuple(self._handlers)
 
     def begin(self, now_ns: int) -> EmulatorState:
         """All robots stand at their start poses."""
         plant = Plant(self.scenario, self.poses, now_ns)
-        return EmulatorState(plant, now_ns, next_diagnostics_ns=now_ns)
+        guards = EmulatedGuards(self._links, now_ns) if self.scenario.guard.present else None
+        return EmulatorState(plant, now_ns, next_diagnostics_ns=now_ns, guards=guards)
 
     def due_ns(self, state: EmulatorState) -> int:
-        """Time of the next capture, odometry sample, or release of a captured frame."""
-        return state.due_ns
+        """Time of the next capture, odometry sample, release of a captured frame, or look of a guard."""
+        return state.due_ns if state.guards is None else min(state.due_ns, state.guards.due_ns)
 
     def step(
         self, state: EmulatorState, event: Event, now_ns: int
     ) -> tuple[EmulatorState, tuple[Outgoing, ...]]:
-        """Let the world go on to ``now_ns``, then take in a command, a stop or a report.
+        """Let the world go on to ``now_ns``, then take in a command, an order or a report.
 
         The robots move from one thing that matters to them to the next, so that it makes no difference how
         often a node is called in between.
@@ -106,25 +113,54 @@ class EmulatorNode:
         handler = self._handlers.get(event.topic)
         if handler is not None:
             try:
-                handler(state, event.payload, now_ns)
+                out = (*out, *handler(state, event, now_ns))
             except MalformedPayloadError:
                 state.refused = counted(state.refused, "malformed")
+        if state.guards is not None and state.guards.due_ns <= now_ns:
+            out = (*out, *self._obeyed(state, state.guards.look(now_ns)), *state.guards.reports(now_ns))
         return state, out
 
-    def _on_command(self, place: int, state: EmulatorState, payload: bytes, now_ns: int) -> None:
-        state.plant.command(place, payload, now_ns)
+    def _on_command(
+        self, place: int, state: EmulatorState, event: Event, now_ns: int
+    ) -> tuple[Outgoing, ...]:
+        state.plant.command(place, event.payload, now_ns)
+        self._commanded(place, state)
+        return ()
+
+    def _on_wanted(self, place: int, state: EmulatorState, event: Event, now_ns: int) -> tuple[Outgoing, ...]:
+        assert state.guards is not None
+        told = tuple(self._obeyed(state, state.guards.hear(place, event, now_ns)))
+        if state.guards.has_sender(place):
+            self._commanded(place, state)
+        return told
+
+    def _obeyed(self, state: EmulatorState, told: Iterable[tuple[int, Outgoing]]) -> Iterator[Outgoing]:
+        """What guards tell drivers, done by these."""
+        for place, message in told:
+            state.plant.command(place, message.payload, message.stamp_ns)
+            yield message
+
+    def _commanded(self, place: int, state: EmulatorState) -> None:
         state.present = state.present.with_command(place)
         self._get_ready(state)
 
-    def _on_stop(self, state: EmulatorState, payload: bytes, now_ns: int) -> None:
+    def _on_stop(self, state: EmulatorState, event: Event, now_ns: int) -> tuple[Outgoing, ...]:
+        if state.guards is not None:
+            state.guards.stop(event)
         state.plant.halt(now_ns)
+        return ()
 
-    def _on_diagnostics(self, state: EmulatorState, payload: bytes, now_ns: int) -> None:
-        if self.barrier.is_open(state.present):
-            # Nobody has to be waited for any more, and a chain reports a hundred times a second.
-            return
-        state.present = self.barrier.heard(state.present, payload)
-        self._get_ready(state)
+    def _on_arm(self, state: EmulatorState, event: Event, now_ns: int) -> tuple[Outgoing, ...]:
+        if state.guards is not None:
+            state.guards.arm(event, now_ns)
+        return ()
+
+    def _on_diagnostics(self, state: EmulatorState, event: Event, now_ns: int) -> tuple[Outgoing, ...]:
+        # Once nobody has to be waited for any more it is left: a chain reports a hundred times a second.
+        if not self.barrier.is_open(state.present):
+            state.present = self.barrier.heard(state.present, event.payload)
+            self._get_ready(state)
+        return ()
 
     def _get_ready(self, state: EmulatorState) -> None:
         """Open the start barrier once all are alive and commanded."""
@@ -144,6 +180,8 @@ class EmulatorNode:
             elif happened.kind == FRAME:
                 seen = (happened.slot, happened.stamp_ns, happened.number, happened.at_ns)
                 out.append(self.writer.frame(state.plant, *seen))
+                if state.guards is not None:
+                    state.guards.see(out[-1].payload)
             else:
                 self._tell_odometry(state.plant, happened, out)
         return tuple(out)

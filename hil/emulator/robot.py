@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from formation.angles import wrapped
 from formation.arc import Course, along
 from formation.kernel import kernel
 from formation.pose import STANDSTILL, Motion, Pose
+from formation.wrapping import wrapped
 
 _LONGEST_ARC = 0.01
 _ROUNDING = 1e-9  # so that 0.08 / 0.01 counts as 8 whole steps

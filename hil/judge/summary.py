@@ -25,6 +25,7 @@ from hil.judge.noise import certain, judge_noise, supported
 from hil.judge.published_bounds import judge_published
 from hil.judge.run_data import RunData
 from hil.log.report_json import known
+from hil.nodes.stopping import stopped_by
 from hil.scenario.certificate import certificate_json, certificate_of
 from hil.scenario.ordered_sides import refusal
 
@@ -43,6 +44,7 @@ def summarise(run_data: RunData) -> dict[str, Any]:
     motion capture stand in for it, absent where it is known or nothing stands in. ``certified``: only where
     estimates are certified.
     ``law``: a name, of one's own more (:func:`hil.judge.made_by.law_json`).
+    ``stopped_by``: who stopped the run before its time, and why; absent where nobody did.
     ``findings``: what nodes found to be wrong, and the judge (:mod:`hil.judge.findings`); absent where nobody
     could have told. ``orders_refused``: why the scenario's own orders to change sides were, if they were.
     ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it, and ``certified`` hold
@@ -76,6 +78,7 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "clock": judge_clock(arrival_rows(run_data)),
         "commands": _commands(columns),
         "orders_refused": refusal(given) if driven else None,
+        "stopped_by": stopped_by(run_data.found or {}),
         "findings": findings_list(run_data.found, judged_findings(estimation)),
         "rejected": dict(run_data.refused),
         "log": None if run_data.log is None else asdict(run_data.log),

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from hil.guard.report import node_of
 from hil.scenario.links import STARTERS, Link
 
 FOLLOWERS_PER_PROCESS = {"follower": 32, "estimator": 4}
@@ -20,7 +21,7 @@ class Crew:
     ``apart``: estimator and controller of a follower as two processes. ``real``: robots and motion capture
     exist, all but ``emulate``, which is leader, follower or empty. ``by_hand``: a real leader is not driven
     by its program but by somebody else; else it sets off ``countdown_s`` after all are ready, None for what
-    is usual.
+    is usual. ``guarded``: all robots that are commanded have guards.
     """
 
     apart: bool = False
@@ -28,6 +29,7 @@ class Crew:
     emulate: str = ""
     by_hand: bool = False
     countdown_s: float | None = None
+    guarded: bool = True
 
     @property
     def daemons(self) -> tuple[str, ...]:
@@ -42,18 +44,28 @@ class Crew:
         """Whether a daemon of the run drives a real leader."""
         return "leader" in self.daemons and not self.by_hand
 
-    def options(self, daemon: str, log_path: Path) -> list[str]:
+    def guards(self, robots: Sequence[str]) -> tuple[str, ...]:
+        """Names of the guards on real robots, of all robots by name, the leader first."""
+        if not (self.real and self.guarded):
+            return ()
+        leader, *followers = robots
+        real = [*([leader] if self.drives_leader else []), *([] if self.emulate == "follower" else followers)]
+        return tuple(map(node_of, real))
+
+    def options(self, daemon: str, log_path: Path, robots: Sequence[str]) -> list[str]:
         """What a daemon is started with, besides the scenario, the wire and the followers that it serves."""
+        guarded = [] if self.guarded else ["--no-guard"]
         if daemon == "recorder":
-            return ["--out", str(log_path)]
+            return ["--out", str(log_path), *guarded]
         if daemon not in STARTERS:
-            return []
-        needs = ["--needs", ",".join(each for each in self.daemons if each not in STARTERS)]
+            return guarded
+        needed = [*(each for each in self.daemons if each not in STARTERS), *self.guards(robots)]
+        options = ["--needs", ",".join(needed), *guarded]
         if daemon == "emulator":
-            return needs
+            return options
         if self.by_hand:
-            return [*needs, "--by-hand"]
-        return needs if self.countdown_s is None else [*needs, "--countdown", str(self.countdown_s)]
+            return [*options, "--by-hand"]
+        return options if self.countdown_s is None else [*options, "--countdown", str(self.countdown_s)]
 
 
 TOGETHER, APART = Crew().daemons, Crew(apart=True).daemons

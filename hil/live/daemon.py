@@ -12,11 +12,14 @@ from collections.abc import Callable, Iterable, Iterator
 from types import FrameType
 from typing import Any, NamedTuple, Protocol
 
+from hil.live.flood_watch import FloodWatch
 from hil.live.listener_watch import ListenerWatch
+from hil.live.sender_reports import SenderReports
 from hil.nodes.node import Outgoing
 from hil.scenario.schema import Scenario
 from hil.wire.events import TICK, Event
 from hil.wire.pubsub import Inbox, Wire, joined
+from hil.wire.senders import SenderWatch, single_topics
 from hil.wire.session import Endpoints
 from hil.wire.topics import STOP
 
@@ -49,21 +52,33 @@ class Presence(NamedTuple):
     """What the ROS graph calls a worker, and what makes the watch on who listens to it there.
 
     ``overhears``: topics that it hears though they are meant for others: it shows as no listener there.
+    ``hear``: called with the diagnostics of what floods it.
     """
 
     name: str = ""
     make_watch: Callable[[Wire], ListenerWatch] | None = None
     overhears: frozenset[str] = frozenset()
+    hear: Callable[[bytes], None] = lambda _: None
 
 
 ANONYMOUS = Presence()
 
 
+class Watches(NamedTuple):
+    """Who may be listened to, and what there is to say, at a time, of what comes and of who listens."""
+
+    senders: SenderWatch
+    reports: Callable[[int], Iterable[Outgoing]]
+
+
 class Ending:
-    """Whether the process was asked to end: by a signal, by its duration, or by its parent going away."""
+    """Whether the process was asked to end: by a signal, by its duration, or by its parent going away.
+
+    ``signal``: the number of the first one, 0 where it was none.
+    """
 
     def __init__(self) -> None:
-        self.asked = False
+        self.asked, self.signal = False, 0
         self._wakers: list[Callable[[], None]] = []
         self._before: dict[signal.Signals, Any] = {}
 
@@ -80,7 +95,8 @@ class Ending:
     def on_signals(self) -> None:
         """Let SIGINT, SIGTERM and SIGHUP (the terminal or the connection is gone) ask for the end."""
 
-        def handle(_number: int, _frame: FrameType | None) -> None:
+        def handle(number: int, _frame: FrameType | None) -> None:
+            self.signal = self.signal or number
             self.ask()
 
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -118,21 +134,25 @@ def run_daemon(
 
     The worker is made once the wire is there; ``on_ready`` is called when it is subscribed. Events are taken
     one at a time in order of arrival; ``now`` is the host clock when one is taken. Topics lie where the
-    scenario has them. Returns how many arrivals found the inbox full and were dropped.
+    scenario has them. Of what comes faster than any sane sender sends only so much is taken in, except by a
+    thorough worker. Returns how many arrivals found the inbox full and were dropped.
     """
     with joined(endpoints, scenario, presence.name, give_up=lambda: ending.asked) as wire:
         ending.notify(wire.wake)
         worker = make_worker()
         worker.begin(time.time_ns())
+        if worker.thorough:
+            wire.inbox.intake = None
         for topic in worker.subscribes:
             # Who takes down everything is not who a message is meant for.
             wire.subscribe([topic], shown=not worker.thorough and topic not in presence.overhears)
         # What is loaded by now stays for good; walking it again would halt a live step for 100 ms and more.
         gc.freeze()
-        watch = presence.make_watch(wire) if presence.make_watch else None
+        senders = SenderWatch(single_topics(scenario))
+        watch = _reports_on(wire, presence, senders)
         on_ready()
         try:
-            _work(worker, wire, ending, duration_s, watch)
+            _work(worker, wire, ending, duration_s, Watches(senders, watch))
         except Exception:
             # A controller that breaks down says stop all the same. The first error is the one to tell.
             with contextlib.suppress(Exception):
@@ -153,7 +173,11 @@ def aftermath(inbox: Inbox, worker: Worker) -> Iterator[Iterable[Outgoing]]:
 
 
 def _work(
-    worker: Worker, wire: Wire, ending: Ending, duration_s: float | None, watch: ListenerWatch | None
+    worker: Worker,
+    wire: Wire,
+    ending: Ending,
+    duration_s: float | None,
+    watches: Watches,
 ) -> None:
     until = None if duration_s is None else time.monotonic() + duration_s
     taken_ns = 0
@@ -164,15 +188,32 @@ def _work(
         if now_ns < taken_ns:
             # The clock was set back: what was due soon is now far away.
             _publish(wire, worker.take(TICK, now_ns))
-        if event is not None:
+        # Who takes down everything takes that of strangers too.
+        if event is not None and (watches.senders.admits(event, time.monotonic_ns()) or worker.thorough):
             _publish(wire, worker.take(event, now_ns))
         # Also while arrivals are waiting: who is flooded must not fall silent.
         if (taken_ns := time.time_ns()) >= worker.due_ns():
             _publish(wire, worker.take(TICK, taken_ns))
-        if watch is not None:
-            _publish(wire, watch.reports(taken_ns))
+        _publish(wire, watches.reports(taken_ns))
     for messages in aftermath(wire.inbox, worker):
         _publish(wire, messages)
+
+
+def _reports_on(wire: Wire, presence: Presence, senders: SenderWatch) -> Callable[[int], Iterable[Outgoing]]:
+    """What there is to say at a time of what comes and of who listens."""
+    listeners = presence.make_watch(wire) if presence.make_watch else None
+    intake = wire.inbox.intake
+    second = SenderReports(presence.name, senders, presence.hear)
+    flood = FloodWatch(presence.name, intake, presence.hear) if intake is not None else None
+
+    def reports(now_ns: int) -> Iterator[Outgoing]:
+        if listeners is not None:
+            yield from listeners.reports(now_ns)
+        yield from second.reports(now_ns, time.monotonic_ns())
+        if flood is not None:
+            yield from flood.reports(now_ns, time.monotonic_ns())
+
+    return reports
 
 
 def _part(worker: Worker, wire: Wire) -> None:

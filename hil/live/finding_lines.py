@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from hil.nodes.findings import PREFIX, Findings, finding_line, findings_in, findings_json
+from hil.nodes.findings import Findings, finding_line, findings_in, findings_json
+from hil.wire.finding_keys import PREFIX
 from hil.wire.message_types import DiagnosticArray
 from hil.wire.messages import MalformedPayloadError, decode_as
 

@@ -9,11 +9,12 @@ from typing import Any
 
 from formation.pose import STANDSTILL, Motion
 from hil.live.reported_number import reported_number
-from hil.nodes.findings import PREFIX, findings_in, findings_json
+from hil.nodes.findings import findings_in, findings_json
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.events import Event
+from hil.wire.finding_keys import PREFIX
 from hil.wire.lab_robots import robots_of
 from hil.wire.messages import MalformedPayloadError, decode_as
 from hil.wire.source_topics import source_topics
@@ -21,6 +22,7 @@ from hil.wire.source_topics import source_topics
 _RATE_OVER_S = 2.0
 _QUIET_S = 0.25
 _REFUSED = "refused."
+_MOST_NAMES = 4096  # of daemons and of bodies: anybody may send any
 
 
 @dataclass(slots=True)
@@ -79,12 +81,16 @@ class LabState:
         try:
             if event.topic == topics.DIAGNOSTICS:
                 for status in decode_as(event.payload, msg.DiagnosticArray).status:
+                    if status.name not in self._daemons and len(self._daemons) >= _MOST_NAMES:
+                        continue
                     heard, _ = self._daemons.get(status.name, (Heard(), status))
                     heard.note(now)
                     self._daemons[status.name] = heard, status
             elif event.topic == topics.RIGID_BODIES:
                 for body in decode_as(event.payload, msg.RigidBodies).rigidbodies:
-                    self._bodies.setdefault(body.rigid_body_name, Heard()).note(now)
+                    name = body.rigid_body_name
+                    if name in self._bodies or name in self.wanted or len(self._bodies) < _MOST_NAMES:
+                        self._bodies.setdefault(name, Heard()).note(now)
             elif event.topic == topics.STOP:
                 self.stops = [*self.stops[-9:], decode_as(event.payload, msg.String).data]
             elif event.topic in self.robots:

@@ -17,11 +17,15 @@ _PATIENCE_NS = 1_000_000_000
 
 
 class Commanded(NamedTuple):
-    """A robot that we drive. ``node``: what its findings are reported by."""
+    """A robot that we drive. ``node``: what its findings are reported by.
+
+    ``wanted``: where we send what it is to drive, to its guard where it has one.
+    """
 
     node: str
     cmd_vel: str
     odom: str
+    wanted: str
 
 
 class ListenerWatch:
@@ -55,13 +59,28 @@ class ListenerWatch:
 
     def _findings(self, robot: Commanded, now_ns: int) -> Findings:
         """What is wrong and has been for a second: robots come up one topic after the other."""
-        layout, graph = self._layout, self._wire.graph()
-        told, odom = layout.within(layout.name(robot.cmd_vel)), layout.within(layout.name(robot.odom))
-        found: Findings = {}
-        if any(each.publishes and each.key == odom for each in graph):
-            heard_as = [each.typename for each in graph if not each.publishes and each.key == told]
-            found = listener_findings(f"/{layout.name(robot.cmd_vel)}", layout.types[robot.cmd_vel], heard_as)
+        found = self._wrong(robot)
         since_ns = self._since_ns.setdefault(robot.node, now_ns) if found else now_ns
         if not found:
             self._since_ns.pop(robot.node, None)
         return found if now_ns - since_ns >= _PATIENCE_NS else {}
+
+    def _wrong(self, robot: Commanded) -> Findings:
+        graph = self._wire.graph()
+        wheels = {each.session for each in graph if each.publishes and each.key == self._key(robot.odom)}
+        if not wheels:
+            return {}
+        guards = {
+            each.session for each in graph if not each.publishes and each.key == self._key(robot.wanted)
+        }
+        # A robot that has its guard inside has its driver there too.
+        hearers = (robot.wanted,) if wheels & guards else (robot.wanted, robot.cmd_vel)
+        for topic in hearers:
+            key, name = self._key(topic), f"/{self._layout.name(topic)}"
+            heard_as = [each.typename for each in graph if not each.publishes and each.key == key]
+            if found := listener_findings(name, self._layout.types[topic], heard_as):
+                return found
+        return {}
+
+    def _key(self, topic: str) -> str:
+        return self._layout.within(self._layout.name(topic))

@@ -13,11 +13,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hil.errors import UsageError
+from hil.guard.report import GUARDS
 from hil.live.child_processes import Children
 from hil.live.crew import Crew, processes_of
 from hil.live.daemon import Ending
 from hil.live.run_monitor import RunMonitor, Snapshot
+from hil.nodes.findings import named_findings
 from hil.nodes.link_nodes import leader_standstill, standstill
+from hil.nodes.node import diagnostics
+from hil.nodes.stopping import SUPERVISOR, stop_finding
 from hil.scenario.files import scenario_text
 from hil.scenario.links import HOSTED, links_of, node_names
 from hil.scenario.schema import Scenario
@@ -49,13 +53,14 @@ Show = Callable[[Snapshot, float | None], None]
 class Outcome:
     """How a live run ended: what failed (empty: nothing), whether it was interrupted, how long it drove.
 
-    ``robots``: in words, what was seen of how the robots were left.
+    ``robots``: in words, what was seen of how the robots were left. ``signal``: what interrupted it.
     """
 
     failure: str
     interrupted: bool
     duration_s: float
     robots: str
+    signal: int = 0
 
 
 def run_live(
@@ -105,13 +110,17 @@ class _Supervisor:
         self._session = open_session(joining, give_up=give_up)
         self._wire = Wire(self._session, urgent_topics(scenario), layout_of(scenario), "run", allowed)
         self._robots = robots_of(scenario)
+        names = [robot.name for robot in self._robots]
+        self._guards = crew.guards(names)
+        self._nodes += self._guards
+        self._armed: set[str] = set()
         watched = self._robots[0 if crew.drives_leader else 1 :] if crew.real else ()
         self._wheels = {each.odom: each.name for each in watched}
         self._monitor = RunMonitor(self._session, pairs, layout_of(scenario), tuple(self._wheels))
         self._children = Children(log_path.parent)
         self._drivers: list[str] = []
         for name, daemon, followers in processes_of(self._links, crew.daemons):
-            arguments = [str(resolved), *joining.options, *crew.options(daemon, log_path)]
+            arguments = [str(resolved), *joining.options, *crew.options(daemon, log_path, names)]
             for follower in followers:
                 arguments += ["--follower", follower]
             self._children.start(name, daemon, arguments)
@@ -127,10 +136,10 @@ class _Supervisor:
             failure = self._failure(_GLANCE)
             snapshot = self._monitor.update()
             now = time.monotonic()
+            self._arm(snapshot)
             if set_off is None and snapshot.motion_since_ns is not None:
                 set_off = now - (time.time_ns() - snapshot.motion_since_ns) * 1e-9
-            if set_off is None and snapshot.stopped is not None:
-                failure = failure or self._stopped_early()
+            failure = failure or self._stopped(snapshot, set_off is not None)
             if len(snapshot.heard) > known:
                 begun, known = now, len(snapshot.heard)
             patience = START_TIMEOUT if self._all_heard(snapshot) else FIRST_WORD_TIMEOUT
@@ -148,7 +157,7 @@ class _Supervisor:
             unseen = f"{', '.join(moving)} {'have' if len(moving) > 1 else 'has'} not been seen to stand"
             unseen += f" within {STANDSTILL_TIMEOUT:g} s; use {'their' if len(moving) > 1 else 'its'} switch"
             failure = f"{failure}; {unseen}" if failure else unseen
-        return Outcome(failure, ending.asked, driven, self._how_left())
+        return Outcome(failure, ending.asked, driven, self._how_left(), ending.signal)
 
     def close(self) -> None:
         """Who drives robots first, its last word being a standstill; recorder last, to miss nothing."""
@@ -178,15 +187,39 @@ class _Supervisor:
         silent = self._monitor.snapshot.silent(self._nodes, SILENCE)
         return f"the {silent} has said nothing for {SILENCE:g} s" if silent else ""
 
-    def _stopped_early(self) -> str:
-        """That somebody stopped everybody before the leader set off, unless it has set off after all.
+    def _arm(self, snapshot: Snapshot) -> None:
+        """Arm the guards of real robots, once each: who begins a run means to drive them."""
+        for name in self._guards:
+            if name in snapshot.heard and name not in self._armed:
+                self._armed.add(name)
+                self._wire.publish(topics.ARM, encode(msg.String(data=name.removeprefix(GUARDS))))
 
-        A daemon that breaks down says stop with its last breath: then its end is what is wrong.
+    def _stopped(self, snapshot: Snapshot, driving: bool) -> str:
+        """That somebody stopped everybody, or a guard its robot, before the time; empty for neither.
+
+        A daemon that breaks down says stop with its last breath: then its end is what is wrong. Before the
+        leader sets off a guard may yet be armed.
         """
-        failure, snapshot = self._failure(_LAST_BREATH), self._monitor.update()
-        if failure or snapshot.motion_since_ns is not None:
+        held = next(iter(snapshot.held.items()), None) if driving else None
+        if snapshot.stopped is None and held is None:
+            return ""
+        if failure := self._failure(_LAST_BREATH):
             return failure
-        return f"stopped before the leader set off: {snapshot.stopped}"
+        when = "stopped before its time" if driving else "stopped before the leader set off"
+        if snapshot.stopped is not None:
+            who, reason = snapshot.stopped_by, snapshot.stopped
+        else:
+            assert held is not None
+            who, reason = held[1].who, f"{held[0]} {held[1].text}"
+        self._tell_who_stopped(who, reason)
+        return f"{when}: {reason} (by {who})"
+
+    def _tell_who_stopped(self, who: str, reason: str) -> None:
+        """Leave in the log by whom and why the run was stopped."""
+        now_ns = time.time_ns()
+        found = named_findings(stop_finding(who, reason))
+        report = diagnostics(SUPERVISOR, now_ns, f"stopped by {who}: {reason}", found)
+        self._wire.publish(topics.DIAGNOSTICS, encode(report))
 
     def _stop(self, reason: str) -> list[str]:
         """Stop everybody, speak for drivers that may be gone, and wait until the robots stand.

@@ -6,20 +6,24 @@ import contextlib
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import zenoh
 
 from estimation.tracking.tracker import Status
 from formation.pose import Motion
+from hil.guard.report import GUARDS
 from hil.live.reported_number import reported_number
 from hil.nodes.findings import Findings, findings_in
 from hil.nodes.leader_driver import stop_reason
 from hil.scenario.links import STARTERS
 from hil.wire import message_types as msg
 from hil.wire import topics
+from hil.wire.events import Event
+from hil.wire.intake import Intake
 from hil.wire.key_layout import OURS, KeyLayout
 from hil.wire.messages import MalformedPayloadError, decode_as, to_ns
+from hil.wire.outlet import origin_of, sender_of
 from hil.wire.topics import Topics
 
 M = TypeVar("M", bound=msg.Message)
@@ -29,6 +33,15 @@ _STILL_U = 0.05
 _LONGEST_GLANCE = 0.25
 _COMPILES_S = 15.0
 """Between two looks [s]; more than this says that the machine stood still."""
+_MOST_NAMES = 4096
+"""Nodes of which something is kept: anybody may report under any name."""
+
+
+class Held(NamedTuple):
+    """Whom a guard holds its robot for, and why, in words."""
+
+    who: str
+    text: str
 
 
 @dataclass(slots=True, eq=False)
@@ -37,7 +50,8 @@ class Snapshot:
 
     ``followers``: their names from the leader on. ``observed_s``: for how long we have looked. ``heard``: at
     which ``observed_s`` each node last reported, ``problems``: what it said, ``findings``: what it found.
-    ``wheels``: what real robots say of their own motion, by topic. ``stopped``: by what stop.
+    ``wheels``: what real robots say of their own motion, by topic. ``stopped``: by what stop, ``stopped_by``
+    whom. ``held``: why guards let robots be driven no more, by their nodes.
     """
 
     followers: tuple[str, ...] = ()
@@ -47,6 +61,8 @@ class Snapshot:
     findings: dict[str, Findings] = field(default_factory=dict)
     motion_since_ns: int | None = None
     stopped: str | None = None
+    stopped_by: str = ""
+    held: dict[str, Held] = field(default_factory=dict)
     estimates: dict[str, msg.LeaderEstimate] = field(default_factory=dict)
     certified: dict[str, msg.CertifiedEstimate] = field(default_factory=dict)
     commands: dict[str, msg.Command] = field(default_factory=dict)
@@ -129,6 +145,7 @@ class RunMonitor:
     ) -> None:
         self.snapshot = Snapshot(tuple(pair.follower for pair in pairs))
         self._updated_at = time.monotonic()
+        self._intake = Intake()
         self._diagnostics = session.declare_subscriber(layout.heard(topics.DIAGNOSTICS), self._on_diagnostics)
         self._newest = {
             topic: session.declare_subscriber(layout.heard(topic), zenoh.handlers.RingChannel(1))
@@ -138,16 +155,15 @@ class RunMonitor:
 
     def update(self) -> Snapshot:
         """The snapshot as of now. Payloads are decoded here, not in Zenoh's threads."""
-        latest = {
-            topic: sample.payload.to_bytes()
-            for topic, newest in self._newest.items()
-            if (sample := newest.try_recv()) is not None
-        }
+        samples = {topic: newest.try_recv() for topic, newest in self._newest.items()}
+        latest = {topic: sample.payload.to_bytes() for topic, sample in samples.items() if sample is not None}
         snapshot, now = self.snapshot, time.monotonic()
         snapshot.advance(now - self._updated_at)
         self._updated_at = now
         if topics.STOP in latest and snapshot.stopped is None:
             snapshot.stopped = stop_reason(latest[topics.STOP])
+            stop = samples[topics.STOP]
+            snapshot.stopped_by = sender_of(origin_of(stop) if stop is not None else None)
         for pair in self._pairs:
             who = pair.follower
             if seen := _sound(latest, pair.estimate, msg.LeaderEstimate):
@@ -174,16 +190,27 @@ class RunMonitor:
         self._newest.clear()
 
     def _on_diagnostics(self, sample: zenoh.Sample) -> None:
+        said = Event(topics.DIAGNOSTICS, sample.payload.to_bytes(), origin_of(sample))
+        if not self._intake.takes(said, time.monotonic_ns()):
+            return
         try:
-            report = decode_as(sample.payload.to_bytes(), msg.DiagnosticArray)
+            report = decode_as(said.payload, msg.DiagnosticArray)
             stamp_ns = to_ns(report.header.stamp)
         except MalformedPayloadError:
             return
-        self.snapshot.findings |= findings_in(report)
+        found = findings_in(report)
         for status in report.status:
             name = status.name.removeprefix("abreast/")
+            if name not in self.snapshot.heard and len(self.snapshot.heard) >= _MOST_NAMES:
+                continue
+            self.snapshot.findings[name] = found[name]
             self.snapshot.heard[name] = self.snapshot.observed_s
             self.snapshot.problems[name] = status.message if status.level else ""
+            told = {value.key: value.value for value in status.values if value.key.startswith("latched")}
+            if name.startswith(GUARDS) and told.get("latched"):
+                self.snapshot.held[name] = Held(told.get("latched_by", ""), status.message)
+            else:
+                self.snapshot.held.pop(name, None)
             for value in status.values:
                 if name not in STARTERS or value.key != "motion_since_ns":
                     continue

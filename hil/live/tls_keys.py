@@ -19,8 +19,9 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from hil.errors import UsageError
 from hil.scenario.schema import Scenario
-from hil.wire.access import ROLES, ROUTER, Role, access_control, keys_said
+from hil.wire.access import access_control, keys_said
 from hil.wire.role_keys import AUTHORITY, RoleKeys
+from hil.wire.roles import ROLES, ROUTER, Role
 from hil.wire.session_config import role_text
 
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
@@ -39,12 +40,11 @@ _USAGE = {
 class Deployment:
     """What keys are made for: a scenario's names, where its router is reached, and for how long.
 
-    ``guarded``: guards stand before the robots. ``hosts``: names and addresses besides those of loopback.
+    ``hosts``: names and addresses besides those of loopback.
     """
 
     scenario: Scenario
     hosts: tuple[str, ...] = ()
-    guarded: bool = True
     days: int = 825
 
 
@@ -136,9 +136,9 @@ def _fill(
             serialization.NoEncryption(),
         )
         _write(here.secret, secret)
-        access = access_control(wanted.scenario, guarded=wanted.guarded) if role == ROUTER else None
+        access = access_control(wanted.scenario) if role == ROUTER else None
         place = "127.0.0.1" if role == ROUTER else server
-        says = keys_said(wanted.scenario, role, guarded=wanted.guarded)
+        says = keys_said(wanted.scenario, role)
         _write(here.config, role_text(there, f"tls/{place}:{_PORT}", says, access).encode())
 
 

@@ -14,6 +14,7 @@ from hil.log.metadata import certificate_metadata, log_metadata
 from hil.nodes.link_nodes import controller_node, estimator_node
 from hil.nodes.node import Node, Outgoing, outgoing
 from hil.scenario.certificate import certificate_json, certificate_of
+from hil.scenario.guarded import with_guards
 from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
 from hil.wire import topics
@@ -41,6 +42,8 @@ class Prepared(NamedTuple):
 
 def prepared(scenario: Scenario) -> Prepared:
     """All that a run needs before it begins; making it loads and compiles whatever there is to."""
+    # Nobody fails here, and nobody is a stranger.
+    scenario = with_guards(scenario, present=False)
     certificate = certificate_metadata(certificate_json(certificate_of(scenario)))
     return Prepared(make_nodes(scenario), log_metadata(scenario, "lockstep") | certificate)
 

@@ -158,7 +158,7 @@ class ControllerNode:
     def __init__(self, scenario: Scenario, name: str = NAME, *, may_change: bool = True) -> None:
         self.name = name
         self.topics = topics_of(scenario)
-        follower, stamped = self.topics.follower, self.topics.stamped
+        follower, stamped = self.topics.follower, self.topics.wanted_stamped
         self.decision = command_template(follower, MOST_RECEIPTS)
         self.drive = drive_template(follower, stamped=stamped)
         places = self.decision.numbers_at, self.drive.numbers_at
@@ -169,7 +169,7 @@ class ControllerNode:
         is_told = source_of(scenario.controller.law) is TurnSource.TOLD
         leader = (self.topics.leader_cmd_vel,) if is_told else ()
         self._estimate, self._command = self.topics.estimate, self.topics.command
-        self._cmd_vel = self.topics.cmd_vel
+        self._wanted = self.topics.wanted
         orders = (self.topics.side,) if may_change else ()
         self.subscribes: tuple[str, ...] = (self.topics.estimate, topics.STOP, *leader, *orders)
         self._drive_type = drive_type(stamped=stamped)
@@ -225,7 +225,7 @@ class ControllerNode:
             return state, ()
         decided, driven = state.desk.decision[:length].tobytes(), state.desk.drive.tobytes()
         decision = Outgoing(self._command, _COMMAND, decided, now_ns)
-        drive = Outgoing(self._cmd_vel, self._drive_type, driven, now_ns)
+        drive = Outgoing(self._wanted, self._drive_type, driven, now_ns)
         if not is_due(state.next_diagnostics_ns, _DIAGNOSTICS_NS, now_ns):
             return state, (drive, decision)
         state.next_diagnostics_ns = now_ns + _DIAGNOSTICS_NS

@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 from controllers.follower import Command
 from estimation.tracking.prediction import Reported
+from formation.byte_access import read_float
 from formation.kernel import kernel
-from formation.records import load, read_float, store
+from formation.records import load, store
 from hil.nodes.controller_desk import BAD_STAMP, DRIVING, UNSAFE_SIDE_CHANGE, Desk, NodeRules, Notes
 from hil.nodes.controller_events import NOTHING, ControlEvent, Happening
 from hil.nodes.controller_step import (

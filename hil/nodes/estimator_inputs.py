@@ -15,10 +15,10 @@ from estimation.own_motion.odometry_check import OdometrySample
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE
 from estimation.tracking.tracker import COASTING, LOST, status_of
 from estimation.tracking.tracker import newest as newest_point
-from formation.angles import wrapped
 from formation.kernel import kernel
 from formation.pose import Pose
 from formation.records import load, store
+from formation.wrapping import wrapped
 from hil.nodes import estimator_step as step
 from hil.nodes.counting import count
 from hil.nodes.estimator_desk import Desk, NodeRules, Notes, TimedFrame, forget, forget_tracks, noted

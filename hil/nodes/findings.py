@@ -9,13 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from hil.wire.finding_keys import PREFIX
 from hil.wire.message_types import DiagnosticArray
 
 Findings = Mapping[str, str]
 """What was seen, and what was expected, in one line, by the finding's name."""
-
-PREFIX = "finding."
-"""What the keys of findings begin with among the values of a node's diagnostics."""
 
 ADVICE = {
     "odometry_silent": "see that the robot publishes odometry on the topic that the scenario names",
@@ -34,6 +32,8 @@ ADVICE = {
     "nees": "deviations are not what errors are: set the sigmas and the leader's limits to what is true",
     "cusp": "the leader stood or turned back: give the estimator a moment of travel before relying on alpha1",
     "second_sender": "end all but one of those who send on this topic",
+    "guard_latched": "see what it says; abreast arm lets the robot be driven again",
+    "flood": "find out who sends so much there, and end or slow it",
     "command_gaps": "look for what holds the controller or its link up",
     "deaf_robot": "see that the robot listens to the topic and the type of its commands",
     "command_type": "set controller.command_type to what the robot listens to",

@@ -157,9 +157,8 @@ class LeaderDriver:
             wanted, _ = self._limits.apply(self._program((now_ns - state.since_ns) * _NS))
             motion, state.remainder = self._resolution.round(wanted, state.remainder, self._limits)
         pair = self._pair
-        return outgoing(
-            pair.leader_cmd_vel, drive_message(motion, now_ns, pair.leader, stamped=pair.stamped), now_ns
-        )
+        told = drive_message(motion, now_ns, pair.leader, stamped=pair.wanted_stamped)
+        return outgoing(pair.leader_wanted, told, now_ns)
 
 
 def stop_reason(payload: bytes) -> str:

@@ -39,8 +39,8 @@ class StartBarrier:
         self.needs = frozenset(name for need in needs for name in node_names(need, links))
         self._followers = [link.follower for link in links]
         pairs = [link_topics(link) for link in links]
-        self._places = {pair.cmd_vel: place for place, pair in enumerate(pairs, start=1)}
-        self._drive_type = drive_type(stamped=pairs[0].stamped)
+        self._places = {pair.wanted: place for place, pair in enumerate(pairs, start=1)}
+        self._drive_type = drive_type(stamped=pairs[0].wanted_stamped)
         self.subscribes = (topics.DIAGNOSTICS, *self._places)
 
     def after(self, present: Attendance, event: Event) -> Attendance:

@@ -88,7 +88,7 @@ class FollowerReplay:
             sighting=numbers[names.sighting],
             estimate=numbers[names.estimate],
             command=numbers[names.command],
-            drive=numbers[names.cmd_vel],
+            drive=numbers[names.wanted],
             leader_drive=_heard(names.leader_cmd_vel, heard, numbers),
             side=_heard(names.side, heard, numbers),
             stop=numbers[topics.STOP],
@@ -107,7 +107,7 @@ class FollowerReplay:
             truths=counts.get(names.truth, 0) + 1,
             poses=counts.get(topics.RIGID_BODIES, 0) + 1,
             motions=counts.get(names.odom, 0) + 1,
-            driven=counts.get(names.cmd_vel, 0) + 1,
+            driven=counts.get(names.wanted, 0) + 1,
         )
 
     def repeats(self, part: Part) -> Rows[Repeats]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from formation.byte_access import read_float
 from formation.kernel import kernel
-from formation.records import read_float
 from hil.wire.records import CommandNumbers, EstimateNumbers
 
 _DIAGONAL_BYTES = 6 * 8

@@ -71,7 +71,7 @@ class LogReplay:
         self._sides: set[str] = set()
         for (chosen, _), (estimator, controller) in zip(links, nodes, strict=True):
             names = link_topics(chosen)
-            hashed |= {*estimator.subscribes, *controller.subscribes, names.cmd_vel}
+            hashed |= {*estimator.subscribes, *controller.subscribes, names.wanted}
             others |= {names.truth, names.command, names.estimate, names.side}
             self._sides.add(names.side)
         self._hashed = hashed

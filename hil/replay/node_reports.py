@@ -5,8 +5,9 @@ from __future__ import annotations
 import struct
 
 from hil.log.reader import Log, Record
-from hil.nodes.findings import PREFIX, all_found, findings_in
+from hil.nodes.findings import all_found, findings_in
 from hil.wire import topics
+from hil.wire.finding_keys import PREFIX
 from hil.wire.message_types import DiagnosticArray
 from hil.wire.messages import MalformedPayloadError, to_ns
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from controllers.guard import CLOCK_TOLERANCE_NS
 from estimation.time.host_time import HostTime
+from formation.byte_access import bytes_at
 from formation.kernel import kernel
-from formation.records import bytes_at, load, size, store
+from formation.records import load, size, store
 from hil.nodes.estimator_desk import NodeRules
 from hil.nodes.frame_time import time_of
 from hil.nodes.refusals import NOT_REFUSED

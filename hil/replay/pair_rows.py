@@ -147,4 +147,4 @@ class PairRows:
 
 
 def _longest(roles: Roles, nodes: Nodes) -> int:
-    return len(nodes.controller.topics.cmd_vel.encode()) + 1
+    return len(nodes.controller.topics.wanted.encode()) + 1

@@ -5,8 +5,9 @@ It is fed with the estimates as logged, so that it is judged by itself.
 
 from __future__ import annotations
 
+from formation.byte_access import bytes_at, read_int64
 from formation.kernel import kernel
-from formation.records import bytes_at, load, read_int64, size, store
+from formation.records import load, size, store
 from hil.nodes.controller_desk import MALFORMED, UNKNOWN_SIDE
 from hil.nodes.controller_events import NO_REPORT, NOTHING, STOP, TICK, ControlEvent, Happening
 from hil.nodes.controller_inputs import controlled, estimate_heard, noted

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from formation.byte_access import bytes_at, read_byte, read_int64
 from formation.kernel import kernel
-from formation.records import Rows, bytes_at, load, read_byte, read_int64, size, store
+from formation.records import Rows, load, size, store
 from hil.nodes.estimator_inputs import (
     FRAME,
     ODOMETRY,

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from estimation.time.delay_line import Arrival
+from formation.byte_access import bytes_at
 from formation.kernel import entry, kernel
-from formation.records import Rows, bytes_at, load, size, store
+from formation.records import Rows, load, size, store
 from hil.replay.noted_messages import noted_messages
 from hil.replay.pair_desk import BEGINS, DIFFERS, DONE, ODD, ROOM, Lengths, Pair, Repeats, Roles, Tallies
 from hil.replay.repeated_commands import repeated_commands

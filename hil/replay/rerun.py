@@ -203,7 +203,7 @@ def _with_commands(
     recorded = recorded_commands(log, node.topics.command)
     index = index_by_digest(logged_events(log, node.subscribes))
     execution = re_execute(node, node.topics.command, recorded, index)
-    drive = node.topics.cmd_vel
+    drive = node.topics.wanted
     sent = [event.payload for event, _ in logged_events(log, [drive])]
     return Replay(
         link=link,

@@ -142,7 +142,7 @@ def timing_of(log: Log, scenario: Scenario, from_s: float | None = None, to_s: f
     response = _response(commands, span.motions)
     if not commands:
         unknown.append(
-            f"lag and transport unknown: the log has no commands on {names.command!r} or {names.cmd_vel!r}"
+            f"lag and transport unknown: the log has no commands on {names.command!r} or {names.wanted!r}"
         )
     elif response is None:
         unknown.append(
@@ -172,14 +172,14 @@ def _of_commands(lag: float, lateness: Known | None) -> str:
 
 def _commands(log: Log, names: Topics) -> Motions:
     """Commands to the follower by when they were issued: the controller's records, else its drives."""
-    wanted = names.command if names.command in log.topics else names.cmd_vel
+    wanted = names.command if names.command in log.topics else names.wanted
     found: Motions = {}
     for event, now_ns in logged_events(log, [wanted]):
         try:
             if wanted == names.command:
                 record = decode_as(event.payload, msg.Command)
                 found[to_ns(record.header.stamp)] = (record.v2, record.u2)
-            elif names.stamped:
+            elif names.wanted_stamped:
                 drive = decode_as(event.payload, msg.TwistStamped)
                 found[to_ns(drive.header.stamp)] = (drive.twist.linear.x, drive.twist.angular.z)
             else:

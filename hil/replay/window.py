@@ -8,19 +8,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from formation.byte_access import bytes_at, read_byte, read_int64, write_byte, write_int64
 from formation.kernel import kernel
-from formation.records import (
-    Buffer,
-    Rows,
-    bytes_at,
-    load,
-    read_byte,
-    read_int64,
-    size,
-    store,
-    write_byte,
-    write_int64,
-)
+from formation.records import Buffer, Rows, load, size, store
 from hil.wire.blake2b import BLOCK_BYTES, digest_of
 
 NOT_WANTED, UNKNOWN_CHANNEL = -1, -2

@@ -30,6 +30,8 @@ class OdometryFaultSection(Section, frozen=True, kw_only=True):
 class RobotSection(Section, frozen=True, kw_only=True):
     """The emulated robots: first-order actuator lag, limits, command resolution, wheel odometry.
 
+    ``v_rate`` [m/s^2], ``u_rate`` [rad/s^2]: how fast a guard lets speed and turn rate change, 0 for any.
+
     Odometry is noisy, stamped ``odometry_delay_s`` later than the motion that it tells of, and tells the
     motion times ``odometry_scale_v`` and ``odometry_scale_u``; its pose adds that up, without noise.
     """
@@ -37,6 +39,8 @@ class RobotSection(Section, frozen=True, kw_only=True):
     lag_s: NonNegative = 0.1
     v_max: Positive = 0.22
     u_max: Positive = 2.84
+    v_rate: NonNegative = 0.0
+    u_rate: NonNegative = 0.0
     v_resolution: NonNegative = 0.01
     u_resolution: NonNegative = 0.01
     odometry_rate_hz: Rate = 30.0

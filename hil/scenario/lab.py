@@ -1,4 +1,4 @@
-"""Sections of a scenario on what a lab has at both ends: motion capture that comes in, topics on the wire."""
+"""Sections of a scenario on what a lab has at both ends: motion capture, topics on the wire, guards."""
 
 from __future__ import annotations
 
@@ -54,3 +54,19 @@ class WireSection(Section, frozen=True, kw_only=True):
     domain: Annotated[int, Meta(ge=0, le=232)] = 0
     distro: Literal["humble", "iron", "jazzy", "kilted", "rolling"] = "jazzy"
     topics: dict[str, str] | UnsetType = UNSET
+
+
+class GuardSection(Section, frozen=True, kw_only=True):
+    """The guard on every robot that is commanded: between the wire and its driver.
+
+    ``present``: controllers send to guards, on ``cmd_vel_wanted``, and not to drivers; live commands set it
+    unless they are told ``--no-guard``. ``age_s``: oldest command and longest silence that a robot drives on;
+    ``latch_s``: silence after which it has to be armed. ``fence``: x_min, y_min, x_max, y_max [m] that the
+    body of every robot has to stay in; ``separation``: its least distance [m] to any other, 0 for none.
+    """
+
+    present: bool = False
+    age_s: Annotated[float, Meta(gt=0.0, le=10.0)] = 0.15
+    latch_s: Annotated[float, Meta(gt=0.0, le=1e5)] = 1.0
+    fence: tuple[float, float, float, float] | UnsetType = UNSET
+    separation: NonNegative = 0.0

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, get_args
 from msgspec import UNSET, Meta, UnsetType
 
 from hil.scenario.emulated import MocapSection, RobotSection
-from hil.scenario.lab import SourceSection, WireSection
+from hil.scenario.lab import GuardSection, SourceSection, WireSection
 from hil.scenario.section import (
     BodyName,
     MountTriple,
@@ -299,5 +299,6 @@ class Scenario(Section, frozen=True, kw_only=True):
     estimator: EstimatorSection = EstimatorSection()
     source: SourceSection = SourceSection()
     wire: WireSection = WireSection()
+    guard: GuardSection = GuardSection()
     chain: ChainSection | UnsetType = UNSET
     flock: FlockSection | UnsetType = UNSET

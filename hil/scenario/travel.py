@@ -11,7 +11,7 @@ from itertools import pairwise
 
 from msgspec.structs import replace
 
-from formation.angles import wrapped
+from formation.wrapping import wrapped
 from hil.errors import UsageError
 from hil.scenario.schema import Scenario, TableProgram
 

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from formation.byte_access import read_int64
 from formation.kernel import kernel
-from formation.records import read_int64
 
 BLOCK_BYTES = 128
 DIGEST_BYTES = 8

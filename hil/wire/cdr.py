@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from formation.kernel import kernel
-from formation.records import (
-    Buffer,
+from formation.byte_access import (
     read_byte,
     read_float,
     read_int32,
@@ -23,7 +22,11 @@ from formation.records import (
     write_int32,
     write_int64,
 )
+from formation.kernel import kernel
 from hil.wire.records import Placement, Stamp, stamp_of
+
+if TYPE_CHECKING:
+    from formation.records import Buffer
 
 HEAD_BYTES = 4
 """Length of the encapsulation header; alignment counts from its end."""

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from formation.byte_access import read_float, write_float
 from formation.kernel import kernel
-from formation.records import Buffer, read_float, write_float
 from hil.wire.cdr import HEAD_BYTES, after_header, aligned, begin, ends, fits, read_stamp, write_stamp
 from hil.wire.records import Drive, Stamp
+
+if TYPE_CHECKING:
+    from formation.records import Buffer
 
 _TWIST_BYTES = 6 * 8
 _TURN_AT = 5 * 8

@@ -2,18 +2,9 @@
 
 from __future__ import annotations
 
+from formation.byte_access import read_byte, read_float, read_uint32, write_byte, write_float, write_int32
 from formation.kernel import kernel
-from formation.records import (
-    Buffer,
-    Rows,
-    load,
-    read_byte,
-    read_float,
-    read_uint32,
-    write_byte,
-    write_float,
-    write_int32,
-)
+from formation.records import Buffer, Rows, load
 from hil.wire.cdr import (
     HEAD_BYTES,
     STAMP_BYTES,

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from estimation.bounds.window_velocity import WindowVelocity
 from estimation.tracking.estimate import Estimate, Joint
+from formation.byte_access import write_float
 from formation.kernel import kernel
-from formation.records import Buffer, Rows, write_float
+from formation.records import Buffer, Rows
 from hil.wire.assumed_errors import AssumedErrors, bounds_of
 from hil.wire.cdr import STAMP_BYTES, aligned
 from hil.wire.estimate_layout import COVARIANCE_AT, write_estimate

@@ -5,19 +5,48 @@ from __future__ import annotations
 import functools
 import hashlib
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 _SIGN, _TWICE_SIGN = 1 << 63, 1 << 64
+
+
+NUMBERS = 1 << 32
+"""So many numbers a publisher has for what it sends, and begins anew after that."""
+
+
+class Origin(NamedTuple):
+    """Who sent a payload: a Zenoh session and one of its publishers, which numbers what it sends."""
+
+    session: str
+    publisher: int
+    number: int
+
+    @property
+    def sender(self) -> str:
+        """Session and publisher, without the number."""
+        return f"{self.session}/{self.publisher}"
+
+    def is_after(self, other: Origin) -> bool:
+        """Whether this is later than another payload of the same sender.
+
+        >>> Origin("7f", 1, 5).is_after(Origin("7f", 1, 4))
+        True
+        """
+        return 0 < (self.number - other.number) % NUMBERS < NUMBERS // 2
 
 
 @dataclass(slots=True, unsafe_hash=True)
 class Event:
     """What happens to a node: a payload on a topic or, with an empty ``topic``, the passing of time.
 
+    ``origin``: who sent it, None where the sender does not say; bridges and foreign programs do not. It is
+    for the shell: no step of a node looks at it.
     Nobody changes one: it is handed to all that take it in.
     """
 
     topic: str = ""
     payload: bytes = b""
+    origin: Origin | None = field(default=None, compare=False)
     _digest: int | None = field(default=None, init=False, repr=False, compare=False)
 
     @property

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from formation.byte_access import read_uint32, write_int32
 from formation.kernel import kernel
-from formation.records import Buffer, Indices, Rows, load, read_uint32, size, store, write_int32
+from formation.records import Buffer, Indices, Rows, load, size, store
+from hil.wire.body_walk import after_markers
 from hil.wire.cdr import (
     HEAD_BYTES,
     PLACEMENT_BYTES,
@@ -21,7 +23,6 @@ from hil.wire.cdr import (
 from hil.wire.records import Body, FrameHead, Placement, Stamp
 
 _NOWHERE = Placement(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-_POINT_BYTES = 24
 
 
 @kernel(inline=False)
@@ -40,7 +41,7 @@ def read_bodies(payload: bytes, names: bytes, bodies: Rows[Body]) -> FrameHead:
     at += 8
     for _ in range(count):
         name_at = aligned(at, 4)
-        at = aligned(_after_markers(payload, after_text(payload, name_at)), 8)
+        at = aligned(after_markers(payload, after_text(payload, name_at)), 8)
         if not fits(payload, at, PLACEMENT_BYTES):
             return FrameHead(False, stamp, 0, 0)
         k = text_number(names, payload, name_at)
@@ -52,24 +53,6 @@ def read_bodies(payload: bytes, names: bytes, bodies: Rows[Body]) -> FrameHead:
             store(bodies, k, Body(known.seen + 1, place))
         at += PLACEMENT_BYTES
     return FrameHead(ends(payload, at), stamp, frame_number, strangers)
-
-
-@kernel
-def _after_markers(payload: bytes, at: int) -> int:
-    """Position after a sequence of markers, -1 if there is none; nobody looks at them."""
-    at = aligned(at, 4)
-    if not fits(payload, at, 4):
-        return -1
-    count = read_uint32(payload, at)
-    at += 4
-    for _ in range(count):
-        # The type of the id, a byte, then the index, aligned to four.
-        at = aligned(at + 1, 4) + 4
-        at = aligned(after_text(payload, at), 8)
-        if not fits(payload, at, _POINT_BYTES):
-            return -1
-        at += _POINT_BYTES
-    return at
 
 
 @kernel

@@ -13,12 +13,17 @@ from hil.wire.topics import link_topics
 
 @dataclass(frozen=True, slots=True)
 class LabRobot:
-    """A robot of a scenario: its name, body and topics, and where the body sits as far as is known."""
+    """A robot of a scenario: its name, body and topics, and where the body sits as far as is known.
+
+    ``wanted``: where what it is to drive is sent, to its guard where it has one.
+    """
 
     name: str
     body: str
+    namespace: str
     odom: str
     cmd_vel: str
+    wanted: str
     mount: Mount = NO_MOUNT
 
 
@@ -29,5 +34,8 @@ def robots_of(scenario: Scenario) -> tuple[LabRobot, ...]:
     names = (scenario.leader.name, *(link.follower for link in links))
     wheels = (pairs[0].leader_odom, *(pair.odom for pair in pairs))
     drives = (pairs[0].leader_cmd_vel, *(pair.cmd_vel for pair in pairs))
+    wanted = (pairs[0].leader_wanted, *(pair.wanted for pair in pairs))
+    spaces = (pairs[0].leader, *(pair.follower for pair in pairs))
     mounts = (Mount(*scenario.leader.mount), *(Mount(*scenario.follower.mount) for _ in links))
-    return tuple(map(LabRobot, names, all_bodies(scenario), wheels, drives, mounts))
+    bodies = all_bodies(scenario)
+    return tuple(map(LabRobot, names, bodies, spaces, wheels, drives, wanted, mounts))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from formation.byte_access import read_float, write_float
 from formation.kernel import kernel
-from formation.records import Buffer, read_float, write_float
+from formation.records import Buffer
 from hil.wire.cdr import (
     HEAD_BYTES,
     PLACEMENT_BYTES,

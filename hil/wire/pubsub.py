@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 import queue
-import struct
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -15,58 +13,54 @@ import zenoh
 
 from hil.errors import UsageError
 from hil.scenario.schema import Scenario
+from hil.wire.clock_query import tell_time
 from hil.wire.events import TICK, Event
+from hil.wire.intake import Intake, intake_of
 from hil.wire.key_layout import OURS, KeyLayout, layout_of
+from hil.wire.outlet import Outlet, gid_of, origin_of
 from hil.wire.ros_tokens import Endpoint, all_tokens, endpoint_in, endpoint_token, node_token
 from hil.wire.session import Endpoints, allowed_keys, close_session, open_session
-from hil.wire.topics import STOP, urgent_topics
+from hil.wire.topics import ARM, STOP, urgent_topics
 
-INBOX_LIMIT = 100_000
+INBOX_LIMIT, INBOX_BYTES = 100_000, 1 << 28
 """Payloads kept waiting at most; more than this is dropped and counted, so that memory stays bounded."""
 
 
 @dataclass(slots=True)
 class Inbox:
-    """Payloads in order of arrival. ``dropped``: how many found it full."""
+    """Payloads in order of arrival. ``dropped``: how many found it full.
+
+    ``intake``: what lets them in; without it all that there is room for. ``put_bytes``, ``taken_bytes``: of
+    payloads that ever came in and went out.
+    """
 
     waiting: queue.SimpleQueue[Event] = field(default_factory=queue.SimpleQueue)
     dropped: int = 0
+    intake: Intake | None = None
+    put_bytes: int = 0
+    taken_bytes: int = 0
+    _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def put(self, event: Event) -> None:
-        """Append an event; called from Zenoh's threads and from signal handlers."""
-        if self.waiting.qsize() >= INBOX_LIMIT:
-            self.dropped += 1
-        else:
+        """Append an event; called from Zenoh's threads."""
+        with self._lock:
+            if self.intake is not None and not self.intake.takes(event, time.monotonic_ns()):
+                return
+            waiting = self.put_bytes - self.taken_bytes + len(event.payload)
+            if self.waiting.qsize() >= INBOX_LIMIT or waiting > INBOX_BYTES:
+                self.dropped += 1
+                return
+            self.put_bytes += len(event.payload)
             self.waiting.put(event)
 
     def take(self, timeout: float) -> Event | None:
-        """Next event, or None after ``timeout`` [s] without one."""
+        """Next event, or None after ``timeout`` [s] without one. Called by one thread."""
         try:
-            return self.waiting.get(timeout=timeout) if timeout > 0.0 else self.waiting.get_nowait()
+            event = self.waiting.get(timeout=timeout) if timeout > 0.0 else self.waiting.get_nowait()
         except queue.Empty:
             return None
-
-
-@dataclass(slots=True)
-class _Outlet:
-    """A publisher; ``gid``: what rmw_zenoh knows it by, empty where nobody asks; ``sent``: how many."""
-
-    publisher: zenoh.Publisher
-    gid: bytes
-    sent: int = 0
-
-    def put(self, payload: bytes) -> None:
-        if not self.gid:
-            self.publisher.put(payload)
-            return
-        self.sent += 1
-        # Without number, time and sender rmw_zenoh drops what it gets.
-        self.publisher.put(payload, attachment=attachment(self.sent, time.time_ns(), self.gid))
-
-
-def attachment(number: int, stamp_ns: int, gid: bytes) -> bytes:
-    """What rmw_zenoh has with every message: its number from 1 on, its time, and 16 bytes of its sender."""
-    return struct.pack("<qqB16s", number, stamp_ns, len(gid), gid)
+        self.taken_bytes += len(event.payload)
+        return event
 
 
 class Wire:
@@ -88,7 +82,7 @@ class Wire:
         self.inbox = Inbox()
         self._session = session
         self._urgent, self._layout, self._allowed = frozenset(urgent), layout, allowed
-        self._outlets: dict[str, _Outlet] = {}
+        self._outlets: dict[str, Outlet] = {}
         self._subscribers: list[zenoh.Subscriber[None]] = []
         self._tokens: list[zenoh.LivelinessToken] = []
         self._graph: dict[str, Endpoint] = {}
@@ -107,7 +101,7 @@ class Wire:
         for topic in topics:
 
             def keep(sample: zenoh.Sample, topic: str = topic) -> None:
-                self.inbox.put(Event(topic, sample.payload.to_bytes()))
+                self.inbox.put(Event(topic, sample.payload.to_bytes(), origin_of(sample)))
 
             direct = zenoh.handlers.Callback(keep, indirect=False)
             key = self._layout.heard(topic)
@@ -171,7 +165,7 @@ class Wire:
         self._subscribers.clear()
         self._outlets.clear()
 
-    def _declare(self, topic: str) -> _Outlet:
+    def _declare(self, topic: str) -> Outlet:
         if not self.may_publish(topic):
             raise UsageError(
                 f"{self._layout.key(topic)}: our keys do not let us publish there; docs/security.md says who "
@@ -182,9 +176,9 @@ class Wire:
                 return declared
             return self._declared(topic)
 
-    def _declared(self, topic: str) -> _Outlet:
+    def _declared(self, topic: str) -> Outlet:
         urgent = topic in self._urgent
-        must_arrive = topic == STOP
+        must_arrive = topic in (STOP, ARM)
         congestion = zenoh.CongestionControl.BLOCK if must_arrive else zenoh.CongestionControl.DROP
         key = self._layout.key(topic)
         publisher = self._session.declare_publisher(
@@ -197,8 +191,7 @@ class Wire:
         )
         token = self._show_endpoint(topic, publishes=True)
         told = token or f"{self._session.zid()}/{key}"
-        gid = hashlib.blake2b(told.encode(), digest_size=16).digest()
-        outlet = _Outlet(publisher, gid if self._layout.kind == "rmw_zenoh" else b"")
+        outlet = Outlet(publisher, gid_of(told) if self._layout.kind == "rmw_zenoh" else b"")
         self._outlets[topic] = outlet
         return outlet
 
@@ -227,13 +220,17 @@ def joined(
 ) -> Iterator[Wire]:
     """The wire of a scenario's lab for as long as the block lasts. ``node``: what the ROS graph shows of us.
 
+    No more is taken in than any sane lab sends.
     The rest is as of :func:`hil.wire.session.open_session`, and so is what it raises.
     """
     allowed = allowed_keys(endpoints)
     session = open_session(endpoints, patience, give_up)
     wire = Wire(session, urgent_topics(scenario), layout_of(scenario), node, allowed)
+    clock = tell_time(session)
+    wire.inbox.intake = intake_of(scenario)
     try:
         yield wire
     finally:
+        clock.undeclare()  # type: ignore[no-untyped-call]
         wire.close()
         close_session(session)

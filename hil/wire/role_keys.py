@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hil.errors import UsageError
-from hil.wire.access import ROLES, Role
+from hil.wire.roles import ROLES, Role
 
 AUTHORITY = "ca.pem"
 """Certificate of the authority that all others are of; its key is kept nowhere."""

@@ -14,9 +14,9 @@ from pathlib import Path
 import zenoh
 
 from hil.errors import AbreastError, UsageError
-from hil.wire.access import OPERATOR, ROUTER
 from hil.wire.refused_session import reason_for
 from hil.wire.role_keys import RoleKeys
+from hil.wire.roles import OPERATOR, ROUTER
 from hil.wire.session_config import (
     connects_to,
     endpoint_config,

@@ -26,6 +26,9 @@ RIGID_BODIES = "rigid_bodies"
 TRUTH = "truth"
 DIAGNOSTICS = "diagnostics"
 STOP = "stop"
+ARM = "arm"
+"""Lets robots be driven again that their guards hold: the name of one, empty for all."""
+WANTED = "cmd_vel_wanted"
 MALFORMED = "malformed"
 LOG = "abreast/log"
 """What a log says of itself, again and again; :mod:`hil.log.description`."""
@@ -43,13 +46,15 @@ def within(namespace: str, name: str) -> str:
 class Topics:
     """The topics of a leader and a follower in namespaces of theirs, empty for none.
 
-    ``truth``: where the emulator tells their true state.
+    ``stamped``: whether drivers take stamped commands. ``truth``: where the emulator tells their true state.
+    ``guarded``: whether robots have guards, which take what is wanted of them and alone tell their drivers.
     """
 
     leader: str
     follower: str
     stamped: bool
     truth: str = TRUTH
+    guarded: bool = False
 
     @property
     def leader_odom(self) -> str:
@@ -70,6 +75,21 @@ class Topics:
     def cmd_vel(self) -> str:
         """What the follower is told to drive."""
         return within(self.follower, "cmd_vel")
+
+    @property
+    def leader_wanted(self) -> str:
+        """Where whoever drives the leader sends: to its guard, without one to its driver."""
+        return within(self.leader, WANTED) if self.guarded else self.leader_cmd_vel
+
+    @property
+    def wanted(self) -> str:
+        """Where the follower's controller sends: to its guard, without one to its driver."""
+        return within(self.follower, WANTED) if self.guarded else self.cmd_vel
+
+    @property
+    def wanted_stamped(self) -> bool:
+        """Whether what is wanted is stamped; for guards always."""
+        return self.guarded or self.stamped
 
     @property
     def sighting(self) -> str:
@@ -100,12 +120,14 @@ class Topics:
     def types(self) -> dict[str, str]:
         """Type name of every topic."""
         drive = TwistStamped if self.stamped else Twist
+        wanted = TwistStamped if self.wanted_stamped else Twist
         return {
             RIGID_BODIES: typename_of(RigidBodies),
             self.leader_odom: typename_of(Odometry),
             self.odom: typename_of(Odometry),
             self.leader_cmd_vel: typename_of(drive),
             self.cmd_vel: typename_of(drive),
+            **dict.fromkeys((self.leader_wanted, self.wanted), typename_of(wanted)),
             self.sighting: typename_of(RangeBearing),
             self.estimate: typename_of(LeaderEstimate),
             self.certified: typename_of(CertifiedEstimate),
@@ -114,6 +136,7 @@ class Topics:
             self.truth: typename_of(Truth),
             DIAGNOSTICS: typename_of(DiagnosticArray),
             STOP: typename_of(String),
+            **({ARM: typename_of(String)} if self.guarded else {}),
             MALFORMED: typename_of(Malformed),
             LOG: typename_of(String),
         }
@@ -130,13 +153,14 @@ def link_topics(link: Link) -> Topics:
     stamped = scenario.controller.command_type == "TwistStamped"
     leader, follower = namespaces_of(scenario)
     truth = within(follower, TRUTH) if link.in_chain else TRUTH
-    return Topics(leader, follower, stamped, truth)
+    return Topics(leader, follower, stamped, truth, scenario.guard.present)
 
 
 def urgent_topics(scenario: Scenario) -> tuple[str, ...]:
-    """Topics that go ahead of all others: what robots are told to drive, and the stop."""
+    """Topics that go ahead of all others: what robots are told and wanted to drive, stop and arming."""
     pairs = [link_topics(link) for link in links_of(scenario)]
-    return (pairs[0].leader_cmd_vel, *(pair.cmd_vel for pair in pairs), STOP)
+    first = (pairs[0].leader_cmd_vel, pairs[0].leader_wanted)
+    return (*first, *(pair.cmd_vel for pair in pairs), *(pair.wanted for pair in pairs), STOP, ARM)
 
 
 def types_of(scenario: Scenario) -> dict[str, str]:

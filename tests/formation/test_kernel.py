@@ -17,6 +17,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from formation.byte_access import (
+    read_byte,
+    read_float,
+    read_int32,
+    read_uint32,
+    write_byte,
+    write_float,
+    write_int32,
+    write_int64,
+)
 from formation.kernel import entry, interpreted, kernel
 from formation.lending import lent
 from formation.records import (
@@ -27,18 +37,10 @@ from formation.records import (
     copy_of,
     dtype_of,
     load,
-    read_byte,
-    read_float,
-    read_int32,
-    read_uint32,
     row_of,
     rows_of,
     size,
     store,
-    write_byte,
-    write_float,
-    write_int32,
-    write_int64,
 )
 
 ROOT = Path(__file__).resolve().parent.parent.parent

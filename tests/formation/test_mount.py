@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from formation.angles import wrapped
 from formation.mount import NO_MOUNT, Mount, body_pose, robot_pose
 from formation.pose import Pose
+from formation.wrapping import wrapped
 from tests.bits import same_bits
 
 lengths = st.floats(-3.0, 3.0)

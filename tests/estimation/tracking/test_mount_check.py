@@ -19,11 +19,11 @@ from estimation.tracking.mount_check import (
     mount_left,
     surely_above,
 )
-from formation.angles import wrapped
 from formation.kernel import entry
 from formation.mount import Mount, body_pose
 from formation.pose import Pose, advance
 from formation.records import Rows, load, rows_of, store
+from formation.wrapping import wrapped
 from tests.bits import same_bits
 
 NOISE = PoseNoise(3e-4, 3.5e-3)

@@ -17,7 +17,7 @@ from hil.wire.messages import decode_as
 from hil.wire.pubsub import Wire
 from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
 
-ROBOT = Commanded("listeners", "follower/cmd_vel", "follower/odom")
+ROBOT = Commanded("listeners", "follower/cmd_vel", "follower/odom", "follower/cmd_vel")
 S = 1_000_000_000
 PATIENCE = 30.0
 

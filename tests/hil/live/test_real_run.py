@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -26,6 +27,8 @@ pytestmark = pytest.mark.slow
 
 DURATION, FROM = 20.0, 12.0
 
+
+GUARD = ("guard", "turtlebot3", "--robot")
 
 Met = tuple[str, list[str]]
 """An endpoint at which all meet, and by which options of a run."""
@@ -56,12 +59,21 @@ def real_run(
         lab = subprocess.Popen(
             [sys.executable, "-m", "tests.hil.live.stranger_lab", endpoint, str(table), *lab_options]
         )
+        commanded = {"leader", "follower"} - {*lab_options[1:], "leader" if "--hand" in lab_options else ""}
+        guards = [
+            subprocess.Popen([sys.executable, "-m", "hil", *GUARD, robot, "--connect", endpoint])
+            for robot in sorted(commanded)
+        ]
         try:
             yield Run(folder / "run", endpoint, process, 0), table
             lab.send_signal(signal.SIGTERM)
             assert lab.wait(30.0) == 0
+            for guard in guards:
+                guard.send_signal(signal.SIGTERM)
+                assert guard.wait(30.0) == 0
         finally:
-            for each in (process, lab):
+            processes: list[subprocess.Popen[Any]] = [process, lab, *guards]
+            for each in processes:
                 if each.poll() is None:
                     each.kill()
                     each.wait()

@@ -17,8 +17,8 @@ from cryptography.x509.verification import PolicyBuilder, Store
 from hil.errors import UsageError
 from hil.live.tls_keys import Deployment, make_keys
 from hil.scenario.files import load_scenario
-from hil.wire.access import ROLES, ROUTER
 from hil.wire.role_keys import RoleKeys
+from hil.wire.roles import ROLES, ROUTER
 from tests.tls_labs import NOW, lab_keys
 
 TURTLEBOT3 = load_scenario("turtlebot3")

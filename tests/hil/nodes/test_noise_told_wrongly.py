@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from estimation.models.measurement import PairSeen
-from formation.angles import wrapped
 from formation.pose import Pose, advance
 from formation.records import load, row_of
+from formation.wrapping import wrapped
 from hil.nodes import estimator_step as step
 from hil.nodes.estimator import EstimatorNode
 from hil.nodes.estimator_desk import NOTHING_KNOWN

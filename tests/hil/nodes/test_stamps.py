@@ -16,9 +16,9 @@ from estimation.models.measurement import PairSeen
 from estimation.own_motion.odometry_check import OdometrySample
 from estimation.tracking.track_point import SAME_NS
 from estimation.tracking.tracker import TRACKING
-from formation.angles import wrapped
 from formation.pose import Pose, advance
 from formation.records import load, row_of
+from formation.wrapping import wrapped
 from hil.nodes import estimator_step as step
 from hil.nodes.estimator import EstimatorNode
 from hil.nodes.estimator_desk import NOTHING_KNOWN

@@ -12,16 +12,18 @@ import zenoh
 
 from hil.errors import UsageError
 from hil.scenario.files import load_scenario
+from hil.scenario.guarded import with_guards
 from hil.scenario.schema import Scenario
-from hil.wire.access import ROLES, ROUTER, Role, access_control, access_layout, access_of
+from hil.wire.access import access_control, access_of
 from hil.wire.pubsub import Wire
 from hil.wire.role_keys import RoleKeys
+from hil.wire.roles import ROLES, ROUTER, Role
 from hil.wire.session import Endpoints, NoRouterError, close_session, open_session, reserved_endpoint
 from hil.wire.session_config import keys_config
 from hil.wire.topics import DIAGNOSTICS, RIGID_BODIES, STOP
 from tests.tls_labs import PATIENCE, TlsLab, lab_keys, tls_lab
 
-TURTLEBOT3 = load_scenario("turtlebot3")
+TURTLEBOT3 = with_guards(load_scenario("turtlebot3"))
 LAYOUTS = {
     "ros2dds": ("wire.prefix=lab7",),
     "rmw_zenoh": ("wire.layout=rmw_zenoh", "wire.domain=30", "wire.prefix=lab7"),
@@ -59,7 +61,7 @@ def is_listened_to(publisher: zenoh.Publisher) -> bool:
 
 
 def all_topics(scenario: Scenario) -> set[str]:
-    given = access_of(scenario, guarded=True).values()
+    given = access_of(scenario).values()
     return {topic for each in given for topic in each.says | each.hears}
 
 
@@ -78,7 +80,7 @@ def speak(wires: dict[Role, Wire], topics: set[str], heard: Wire, expected: set[
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_the_router_lets_through_what_a_role_may_say_and_nothing_else(layout: str, tmp_path: Path) -> None:
     scenario = lab_keys(tmp_path / "keys", *LAYOUTS[layout])
-    given = access_of(scenario, guarded=True)
+    given = access_of(scenario)
     expected = {(topic, role.encode()) for role, each in given.items() for topic in each.says}
     with tls_lab(tmp_path / "keys") as lab:
         recorder, robot = lab.wire("recorder", scenario), lab.wire("robot", scenario)
@@ -96,7 +98,7 @@ def test_the_router_lets_through_what_a_role_may_say_and_nothing_else(layout: st
 
 
 def test_whoever_may_say_something_knows_it_and_is_told_what_it_may_not(plain: TlsLab) -> None:
-    given = access_of(TURTLEBOT3, guarded=True)
+    given = access_of(TURTLEBOT3)
     for role in CLIENTS:
         wire = plain.wire(role, TURTLEBOT3)
         allowed = {topic for topic in all_topics(TURTLEBOT3) if wire.may_publish(topic)}
@@ -218,8 +220,8 @@ def test_a_viewer_does_not_pass_for_a_robot_that_listens(plain: TlsLab) -> None:
 
 @pytest.mark.parametrize("name", ["turtlebot3", "chain5"])
 def test_only_guards_drive_where_there_are_some(name: str) -> None:
-    scenario = load_scenario(name)
-    given = access_of(scenario, guarded=True)
+    scenario = with_guards(load_scenario(name))
+    given = access_of(scenario)
     driven = {topic for each in given.values() for topic in each.says if topic.endswith("/cmd_vel")}
     robots = 2 if name == "turtlebot3" else 5
     assert len(driven) == robots
@@ -232,20 +234,20 @@ def test_only_guards_drive_where_there_are_some(name: str) -> None:
 
 
 def test_orders_are_given_by_operators_and_guards_alone() -> None:
-    given = access_of(TURTLEBOT3, guarded=True)
+    given = access_of(TURTLEBOT3)
     for order in (STOP, "arm", "follower/side"):
         assert {role for role, each in given.items() if order in each.says} == {"operator", "guard"}
 
 
 def test_without_guards_whoever_drives_a_robot_tells_it() -> None:
-    given = access_of(TURTLEBOT3, guarded=False)
+    given = access_of(load_scenario("turtlebot3"))
     told = {role for role, each in given.items() if "follower/cmd_vel" in each.says}
     assert told == {"controller", "follower", "operator"}
     assert not any(topic.endswith("_wanted") for each in given.values() for topic in each.says)
 
 
 def test_what_comes_from_outside_says_no_more_than_that() -> None:
-    given = access_of(TURTLEBOT3, guarded=True)
+    given = access_of(TURTLEBOT3)
     assert given["mocap"].says == {RIGID_BODIES, DIAGNOSTICS}
     assert given["robot"].says == {"leader/odom", "follower/odom", "follower/leader_sighting"}
     assert given["robot"].hears == {"leader/cmd_vel", "follower/cmd_vel", STOP}
@@ -254,15 +256,11 @@ def test_what_comes_from_outside_says_no_more_than_that() -> None:
 
 
 def test_every_subject_is_a_role_with_rules_that_are_there() -> None:
-    made = access_control(TURTLEBOT3, guarded=True)
+    made = access_control(TURTLEBOT3)
     names = {rule["id"] for rule in made["rules"]}
     assert len(names) == len(made["rules"])
     assert {each for policy in made["policies"] for each in policy["rules"]} == names
     assert {name for each in made["subjects"] for name in each["cert_common_names"]} == set(CLIENTS)
-    assert not any({"delete", "query", "reply"} & set(rule["messages"]) for rule in made["rules"])
-
-
-def test_the_layout_knows_what_lies_before_guards() -> None:
-    layout = access_layout(load_scenario("turtlebot3", ("wire.layout=rmw_zenoh",)))
-    assert layout.heard("follower/cmd_vel_wanted").startswith("0/follower/cmd_vel_wanted/geometry_msgs::")
-    assert layout.heard("arm") == "0/arm/std_msgs::msg::dds_::String_/*"
+    assert not any("delete" in rule["messages"] for rule in made["rules"])
+    asked = [rule for rule in made["rules"] if {"query", "reply"} & set(rule["messages"])]
+    assert {key for rule in asked for key in rule["key_exprs"]} == {"abreast/clock/*"}

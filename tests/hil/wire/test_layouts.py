@@ -13,8 +13,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from benchmarks import layouts
+from formation.byte_access import read_float
 from formation.kernel import interpreted
-from formation.records import load, read_float, row_of, rows_of, store
+from formation.records import load, row_of, rows_of, store
 from hil.wire import entries, estimate_layout, templates
 from hil.wire import message_types as msg
 from hil.wire.cdr import packed_texts
