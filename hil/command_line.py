@@ -33,6 +33,8 @@ COMMANDS = {
     "controller": "the controller, as a daemon",
     "leader": "what drives a real leader by its program, as a daemon",
     "recorder": "the recorder, as a daemon",
+    "router": "the router that all others connect to, on its own, as a daemon",
+    "secure": "keys by which a router knows who is who, and what each may do",
     "bridge": "motion captures of others brought to the wire, as a daemon",
 }
 _MODULES = {"import": "import_recording"}

@@ -82,6 +82,9 @@ class RosBridge:
         """What has come from ROS, and diagnostics when they are due."""
         heard, self._heard = self._heard, []
         for topic, payload in heard:
+            if not self._wire.may_publish(topic):
+                self._leave_out(topic)
+                continue
             self._carried[topic] += 1
             yield Outgoing(topic, self._types[topic], payload, now_ns)
         self._begun_ns = self._begun_ns or now_ns
@@ -138,6 +141,12 @@ class RosBridge:
             self._refused[event.topic] += 1
             return
         self._carried[event.topic] += 1
+
+    def _leave_out(self, topic: str) -> None:
+        """An order from ROS where keys say who gives orders: nobody knows who it is there."""
+        if not self._refused[topic]:
+            self._say(f"our keys do not let {topic} through from ROS; it is dropped, as others like it")
+        self._refused[topic] += 1
 
     def _is_echo(self, topic: str, payload: bytes) -> bool:
         """Whether this very message of a two-way route was carried just now, be it the other way."""

@@ -23,7 +23,12 @@ _LISTENS_S = 1.2
 @click.argument("robot", default="")
 @click.option("--scenario", default="turtlebot3", show_default=True, help="Whose robots: a name or a file.")
 def command(
-    robot: str, scenario: str, connect: str | None, zenoh_config: Path | None, overrides: tuple[str, ...]
+    robot: str,
+    scenario: str,
+    connect: str | None,
+    secure: Path | None,
+    zenoh_config: Path | None,
+    overrides: tuple[str, ...],
 ) -> None:
     """Let ROBOT, or without one all robots, be driven again: their guards take whoever sends next.
 
@@ -44,7 +49,8 @@ def command(
     if robot and robot not in known:
         raise UsageError(f"{robot!r}: scenario {chosen.name} has no such robot; one of: {', '.join(known)}")
     guards = GuardsHeard()
-    with joined(endpoints_of(connect, None, zenoh_config), chosen, "arm", patience=3.0) as wire:
+    endpoints = endpoints_of(connect, None, zenoh_config, secure, "operator")
+    with joined(endpoints, chosen, "arm", patience=3.0) as wire:
         wire.subscribe([topics.DIAGNOSTICS], shown=False)
         _hear(wire, guards)
         # Once, and after they were heard: what latches one now is not to be overridden.

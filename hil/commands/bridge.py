@@ -28,6 +28,7 @@ class _Given(TypedDict):
     scenario: str
     connect: str | None
     listen: str | None
+    secure: Path | None
     zenoh_config: Path | None
     duration: float | None
     overrides: tuple[str, ...]
@@ -97,10 +98,13 @@ def bridge_ros2(**given: Unpack[_Given]) -> None:
         lambda wire: RosBridge(wire, routes, lambda hear: RosGraph("abreast", domain, routes, hear), _say),
         chosen,
         given,
+        "bridge",
     )
 
 
-def _run(make_bridge: Callable[[Wire], Bridge], scenario: Scenario, given: _Given) -> None:
+def _run(
+    make_bridge: Callable[[Wire], Bridge], scenario: Scenario, given: _Given, role: str = "mocap"
+) -> None:
     """Run a bridge until it is told to end."""
     with collector_paused():
         from hil.bridge.bridging import run_bridge
@@ -110,7 +114,7 @@ def _run(make_bridge: Callable[[Wire], Bridge], scenario: Scenario, given: _Give
     ending.on_signals()
     if given["tethered"]:
         ending.on_parent_gone()
-    endpoints = endpoints_of(given["connect"], given["listen"], given["zenoh_config"])
+    endpoints = endpoints_of(given["connect"], given["listen"], given["zenoh_config"], given["secure"], role)
 
     def say_ready() -> None:
         _say(f"ready, {scenario.name} on {endpoints.describe()}")

@@ -27,6 +27,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         scenario: str,
         connect: str | None,
         listen: str | None,
+        secure: Path | None,
         zenoh_config: Path | None,
         duration: float | None,
         overrides: tuple[str, ...],
@@ -51,7 +52,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         if tethered:
             ending.on_parent_gone()
         options = NatNetOptions(**natnet)
-        alone = options.natnet and not (connect or listen or zenoh_config)
+        alone = options.natnet and not (connect or listen or zenoh_config or secure)
         chosen = load_scenario(scenario, (*overrides, CERTIFY) if certify else overrides)
         chosen = with_guards(chosen, present=not no_guard)
         if name in HOSTED:
@@ -62,7 +63,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
         if alone:
             serve_alone(order, ending, duration)
             return
-        endpoints = endpoints_of(connect, listen, zenoh_config)
+        endpoints = endpoints_of(connect, listen, zenoh_config, secure, name)
 
         def say_ready() -> None:
             whom = f" for {', '.join(followers)}" if followers else ""

@@ -33,6 +33,7 @@ def command(
     scenario: str,
     connect: str | None,
     listen: str | None,
+    secure: Path | None,
     zenoh_config: Path | None,
     duration: float,
     drive: str | None,
@@ -51,10 +52,8 @@ def command(
 
     chosen = with_guards(load_scenario(scenario, overrides))
     findings: list[dict[str, Any]] = []
-    checks = [
-        disk_check(out),
-        *_visited(chosen, endpoints_of(connect, listen, zenoh_config), duration, drive, findings),
-    ]
+    endpoints = endpoints_of(connect, listen, zenoh_config, secure, "operator")
+    checks = [disk_check(out), *_visited(chosen, endpoints, duration, drive, findings)]
     if as_json:
         click.echo(json.dumps({"checks": [each.as_dict() for each in checks], "findings": findings}))
     else:
@@ -71,6 +70,7 @@ def _visited(
 ) -> Iterator[Check]:
     """Checks of all that can be reached by the wire; what estimators find is put to the findings."""
     with collector_paused():
+        from hil.doctor.access_check import access_of_lab
         from hil.doctor.machine_checks import port_check, route_check
         from hil.doctor.visit import Visit
         from hil.wire.key_layout import layout_of
@@ -85,6 +85,7 @@ def _visited(
     try:
         with joined(endpoints, scenario, "doctor", patience=3.0) as wire:
             yield route_check(endpoints.describe(), "")
+            yield access_of_lab(endpoints, wire.shown_names())
             visit = Visit(scenario, wire)
             examination = visit.examination
             robot = examination.robot(drive) if drive else None
@@ -133,6 +134,6 @@ def _show(checks: list[Check]) -> None:
     for each in checks:
         mark = Text("ok") if each.ok else Text("no", "red")
         table.add_row(mark, each.name, Text(each.seen), Text("" if each.ok else each.expected))
-        if not each.ok:
+        if each.advice:
             table.add_row("", "", Text(each.advice, "bold"), "")
     Console().print(table)

@@ -29,6 +29,7 @@ def command(
     write: Path | None,
     connect: str | None,
     listen: str | None,
+    secure: Path | None,
     zenoh_config: Path | None,
     duration: float | None,
     overrides: tuple[str, ...],
@@ -51,4 +52,5 @@ def command(
             raise UsageError(f"--write {write}: {error.strerror or error}; give another file") from None
         click.echo(f"abreast guard: wrote {write}; on {robot}: abreast-guard {write.name}", err=True)
         return
-    serve(order, endpoints_of(connect, listen, zenoh_config), ros=ros, duration_s=duration or math.inf)
+    endpoints = endpoints_of(connect, listen, zenoh_config, secure, "guard")
+    serve(order, endpoints, ros=ros, duration_s=duration or math.inf)

@@ -15,7 +15,7 @@ from formation.collector import collector_paused
 from hil.commands.guard_option import NO_GUARD
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION, Seconds
-from hil.commands.wire_options import DEFAULT_ENDPOINT
+from hil.commands.wire_options import DEFAULT_ENDPOINT, SECURE_ENDPOINT
 from hil.errors import AbreastError, CheckFailedError, InterruptedRunError, UsageError
 from hil.judge.made_by import law_failure
 from hil.live.crew import Crew
@@ -29,6 +29,7 @@ from hil.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     from hil.live.run import Outcome
+    from hil.wire.role_keys import RoleKeys
     from hil.wire.session import Endpoints
 
 
@@ -71,6 +72,12 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path, dir_okay=False, exists=True),
     metavar="FILE",
     help="Zenoh config file by which all sessions of the run reach a router that is there.",
+)
+@click.option(
+    "--secure",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Keys of all that takes part, by abreast secure init.",
 )
 @click.option("--apart", is_flag=True, help="Estimator and controller as two processes, live.")
 @click.option(
@@ -120,6 +127,7 @@ class _Live:
 
     endpoints: Endpoints | None
     crew: Crew
+    keys: RoleKeys | None = None
 
 
 def _how(
@@ -133,13 +141,15 @@ def _how(
     listen: str | None,
     connect: str | None,
     zenoh_config: Path | None,
+    secure: Path | None,
 ) -> _Live | None:
     """How to run live, None for in lockstep.
 
     Raises :class:`UsageError` for options that exclude each other.
     """
-    if lockstep and (apart or real or no_guard):
-        option = "--apart" if apart else "--real" if real else "--no-guard"
+    apart_from_one = {"--apart": apart, "--real": real, "--no-guard": no_guard, "--secure": secure}
+    option = next((each for each, given in apart_from_one.items() if given), "")
+    if lockstep and option:
         raise UsageError(
             f"{option}: a run in lockstep is one process; leave one of {option} and --lockstep out"
         )
@@ -165,11 +175,16 @@ def _how(
         countdown_s=countdown,
         guarded=not no_guard,
     )
+    from hil.wire.role_keys import RoleKeys
+    from hil.wire.roles import OPERATOR, ROUTER
     from hil.wire.session import Endpoints
 
+    keys = RoleKeys(secure, OPERATOR if connect else ROUTER) if secure else None
+    if real and not (listen or connect or zenoh_config):
+        listen = SECURE_ENDPOINT if secure else DEFAULT_ENDPOINT
     if listen or connect or zenoh_config:
-        return _Live(Endpoints(connect, listen, zenoh_config), crew)
-    return _Live(Endpoints(listen=DEFAULT_ENDPOINT) if real else None, crew)
+        return _Live(Endpoints(connect, listen, zenoh_config, keys), crew)
+    return _Live(None, crew, keys)
 
 
 def _run(chosen: Scenario, folder: Path, live: _Live | None, *, as_json: bool) -> None:
@@ -246,7 +261,10 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> Outcome:
     console = Console(file=sys.stderr)
     starting = console.status(f"starting {', '.join(live.crew.daemons)}")
     with ExitStack() as held:
-        endpoints = live.endpoints or Endpoints(listen=held.enter_context(reserved_endpoint()))
+        protocol = "tls" if live.keys else "tcp"
+        endpoints = live.endpoints or Endpoints(
+            listen=held.enter_context(reserved_endpoint(protocol)), keys=live.keys
+        )
         status = held.enter_context(starting)
         if live.crew.real:
             console.print(Text(f"robots and bridges connect to {endpoints.describe()}"), soft_wrap=True)

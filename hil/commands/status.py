@@ -28,6 +28,7 @@ _REFRESH_S = 0.25
 def command(
     scenario: str,
     connect: str | None,
+    secure: Path | None,
     zenoh_config: Path | None,
     once: bool,
     as_json: bool,
@@ -44,7 +45,7 @@ def command(
     chosen = load_scenario(scenario, overrides)
     state = LabState(chosen)
     clock = time.monotonic
-    endpoints = endpoints_of(connect, None, zenoh_config)
+    endpoints = endpoints_of(connect, None, zenoh_config, secure, "viewer")
     with joined(endpoints, chosen, patience=3.0) as wire, suppress(KeyboardInterrupt):
         wire.subscribe(state.topics, shown=False)
         take = wire.inbox.take

@@ -20,7 +20,12 @@ _LOOK_S = 0.3
 @click.argument("reason", default="stopped by hand")
 @click.option("--scenario", default="turtlebot3", show_default=True, help="Whose robots: a name or a file.")
 def command(
-    reason: str, scenario: str, connect: str | None, zenoh_config: Path | None, overrides: tuple[str, ...]
+    reason: str,
+    scenario: str,
+    connect: str | None,
+    secure: Path | None,
+    zenoh_config: Path | None,
+    overrides: tuple[str, ...],
 ) -> None:
     """Stop everybody for REASON: controllers by a stop message, and robots by a command to stand.
 
@@ -38,14 +43,17 @@ def command(
     chosen = load_scenario(scenario, overrides)
     state, links = LabState(chosen), links_of(chosen)
     clock = time.monotonic
-    with joined(endpoints_of(connect, None, zenoh_config), chosen, "stop", patience=3.0) as wire:
+    endpoints = endpoints_of(connect, None, zenoh_config, secure, "operator")
+    with joined(endpoints, chosen, "stop", patience=3.0) as wire:
         # What we say ourselves comes back on any wire, also on one without robots.
         wire.subscribe(state.robot_topics, shown=False, ours=False)
         for _ in range(_TIMES):
             wire.publish(topics.STOP, encode(String(data=reason)))
             now_ns = time.time_ns()
             for still in (leader_standstill(chosen, now_ns), *(standstill(link, now_ns) for link in links)):
-                wire.publish(still.topic, still.payload)
+                # Behind a guard it is the guard that lets a robot stand, by the stop.
+                if wire.may_publish(still.topic):
+                    wire.publish(still.topic, still.payload)
             hear_for(state, wire.inbox.take, clock, clock() + _REPEAT_S)
         until = clock() + _PATIENCE_S
         while ((driven := state.driven(clock())) or state.unheard()) and clock() < until:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 
 class Check(NamedTuple):
-    """``name``: a word for it. ``advice``: empty where all is well."""
+    """``name``: a word for it. ``advice``: empty where all is well; beside ``ok`` it is a hint only."""
 
     name: str
     ok: bool

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from hil.errors import AbreastError
 
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+DEFAULT_ENDPOINT, SECURE_ENDPOINT = "tcp/127.0.0.1:7447", "tls/127.0.0.1:7447"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -19,12 +19,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # After what is told in no time: help, and what is wrong with the options.
         from hil.guard.order import read_order
         from hil.guard.serving import serve
+        from hil.wire.role_keys import RoleKeys
+        from hil.wire.roles import GUARD
         from hil.wire.session import Endpoints
 
         connect = given.connect
         if not (given.connect or given.listen or given.zenoh_config):
-            connect = DEFAULT_ENDPOINT
-        serve(read_order(given.order), Endpoints(connect, given.listen, given.zenoh_config), ros=given.ros)
+            connect = SECURE_ENDPOINT if given.secure else DEFAULT_ENDPOINT
+        keys = RoleKeys(given.secure, GUARD) if given.secure else None
+        endpoints = Endpoints(connect, given.listen, given.zenoh_config, keys)
+        serve(read_order(given.order), endpoints, ros=given.ros)
     except AbreastError as error:
         sys.stderr.write(f"abreast-guard: {' '.join(str(error).split())}\n")
         return error.exit_code
@@ -39,6 +43,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("order", type=Path, help="file of abreast guard SCENARIO --robot NAME --write FILE")
     parser.add_argument("--connect", metavar="ENDPOINT", help=f"router to connect to [{DEFAULT_ENDPOINT}]")
     parser.add_argument("--listen", metavar="ENDPOINT", help="be a router for the bridge, there")
+    parser.add_argument("--secure", type=Path, metavar="DIR", help="keys by which to join a router with some")
     parser.add_argument("--zenoh-config", type=Path, metavar="FILE", help="Zenoh config, in place of both")
     parser.add_argument("--ros", action="store_true", help="reach the driver by rclpy, without a bridge")
     return parser

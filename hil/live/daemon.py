@@ -21,6 +21,7 @@ from hil.wire.events import TICK, Event
 from hil.wire.pubsub import Inbox, Wire, joined
 from hil.wire.senders import SenderWatch, single_topics
 from hil.wire.session import Endpoints
+from hil.wire.topics import STOP
 
 _LONGEST_WAIT = 0.1
 _LINGER = 0.05
@@ -216,7 +217,9 @@ def _reports_on(wire: Wire, presence: Presence, senders: SenderWatch) -> Callabl
 
 
 def _part(worker: Worker, wire: Wire) -> None:
-    _publish(wire, worker.end(time.time_ns()))
+    # Where keys say that only operators and guards give orders, a parting stop is not ours to say.
+    last = worker.end(time.time_ns())
+    _publish(wire, (each for each in last if each.topic != STOP or wire.may_publish(STOP)))
     time.sleep(_LINGER)
 
 

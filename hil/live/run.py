@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,7 +33,7 @@ from hil.wire.key_layout import layout_of
 from hil.wire.lab_robots import robots_of
 from hil.wire.messages import encode
 from hil.wire.pubsub import Wire
-from hil.wire.session import Endpoints, close_session, open_session
+from hil.wire.session import Endpoints, allowed_keys, close_session, open_session
 from hil.wire.topics import link_topics, urgent_topics
 
 START_TIMEOUT = 120.0
@@ -85,26 +86,34 @@ def run_live(
         raise UsageError(
             f"--out {folder}: cannot be written ({error.strerror}); give another folder"
         ) from None
-    router = open_session(endpoints) if endpoints.listen else None
-    supervisor = _Supervisor(scenario, resolved, log_path, endpoints.joining, crew)
-    try:
+    with ExitStack() as held:
+        if endpoints.listen:
+            held.callback(close_session, open_session(endpoints))
+        supervisor = _Supervisor(
+            scenario, resolved, log_path, endpoints.joining, crew, give_up=lambda: ending.asked
+        )
+        held.callback(supervisor.close)
         return supervisor.run(ending, show)
-    finally:
-        supervisor.close()
-        if router is not None:
-            close_session(router)
 
 
 class _Supervisor:
     def __init__(
-        self, scenario: Scenario, resolved: Path, log_path: Path, joining: Endpoints, crew: Crew
+        self,
+        scenario: Scenario,
+        resolved: Path,
+        log_path: Path,
+        joining: Endpoints,
+        crew: Crew,
+        *,
+        give_up: Callable[[], bool] = lambda: False,
     ) -> None:
         self._scenario, self._crew = scenario, crew
         self._links = links_of(scenario)
         pairs = [link_topics(link) for link in self._links]
         self._nodes = [name for daemon in crew.daemons for name in node_names(daemon, self._links)]
-        self._session = open_session(joining)
-        self._wire = Wire(self._session, urgent_topics(scenario), layout_of(scenario), "run")
+        allowed = allowed_keys(joining)
+        self._session = open_session(joining, give_up=give_up)
+        self._wire = Wire(self._session, urgent_topics(scenario), layout_of(scenario), "run", allowed)
         self._robots = robots_of(scenario)
         names = [robot.name for robot in self._robots]
         self._guards = crew.guards(names)
@@ -256,7 +265,9 @@ class _Supervisor:
         if self._crew.drives_leader:
             still.append(leader_standstill(self._scenario, time.time_ns()))
         for message in still:
-            self._wire.publish(message.topic, message.payload)
+            # Behind a guard it is the guard that lets a robot stand, by the stop.
+            if self._wire.may_publish(message.topic):
+                self._wire.publish(message.topic, message.payload)
 
     def _somebody_moves(self, heard: set[str]) -> bool:
         """Whether a robot that was seen has yet to stand; without the emulator no emulated one ever will.

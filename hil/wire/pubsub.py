@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import zenoh
 
+from hil.errors import UsageError
 from hil.scenario.schema import Scenario
 from hil.wire.clock_query import tell_time
 from hil.wire.events import OVERSIZED, TICK, Event
@@ -18,7 +19,7 @@ from hil.wire.intake import Intake, intake_of
 from hil.wire.key_layout import OURS, KeyLayout, layout_of
 from hil.wire.outlet import Outlet, gid_of, origin_of
 from hil.wire.ros_tokens import Endpoint, all_tokens, endpoint_in, endpoint_token, node_token
-from hil.wire.session import Endpoints, close_session, open_session
+from hil.wire.session import Endpoints, allowed_keys, close_session, open_session
 from hil.wire.topics import ARM, STOP, urgent_topics
 
 INBOX_LIMIT, INBOX_BYTES = 100_000, 1 << 28
@@ -68,15 +69,21 @@ class Wire:
     """Subscriptions into one inbox, and publishers that are declared when first used.
 
     ``urgent``: topics that go ahead of all others; ``layout``: the keys of topics. ``node``: the name under
-    which all this shows in the ROS graph; without one it does not.
+    which all this shows in the ROS graph; without one it does not. ``allowed``: the keys on which it may
+    publish, None for all.
     """
 
     def __init__(
-        self, session: zenoh.Session, urgent: Iterable[str] = (), layout: KeyLayout = OURS, node: str = ""
+        self,
+        session: zenoh.Session,
+        urgent: Iterable[str] = (),
+        layout: KeyLayout = OURS,
+        node: str = "",
+        allowed: frozenset[str] | None = None,
     ) -> None:
         self.inbox = Inbox()
         self._session = session
-        self._urgent, self._layout = frozenset(urgent), layout
+        self._urgent, self._layout, self._allowed = frozenset(urgent), layout, allowed
         self._outlets: dict[str, Outlet] = {}
         self._subscribers: list[zenoh.Subscriber[None]] = []
         self._tokens: list[zenoh.LivelinessToken] = []
@@ -111,12 +118,16 @@ class Wire:
         """Send a payload; urgent topics go ahead of all others.
 
         A subscriber that cannot follow loses messages rather than holding up everybody else, but for a stop,
-        which must arrive.
+        which must arrive. Raises :class:`UsageError` for a topic that is not ours to publish.
         """
         outlet = self._outlets.get(topic)
         if outlet is None:
             outlet = self._declare(topic)
         outlet.put(payload)
+
+    def may_publish(self, topic: str) -> bool:
+        """Whether our keys let us publish a topic: a router drops what they don't, and tells nobody."""
+        return self._allowed is None or self._layout.heard(topic) in self._allowed
 
     def watch_graph(self) -> None:
         """Begin to take down who publishes and who hears what, by everybody's tokens."""
@@ -133,6 +144,11 @@ class Wire:
             all_tokens(self._layout), direct, history=True
         )
         self._subscribers.append(watching)
+
+    def shown_names(self) -> tuple[str, ...]:
+        """Common names of the certificates that the other ends of our links show, of each that shows one."""
+        shown = (link.auth_identifier for link in self._session.info.links())
+        return tuple(name for name in shown if name)
 
     def graph(self) -> tuple[Endpoint, ...]:
         """Publishers and subscriptions of everybody, as far as they show in the ROS graph."""
@@ -155,6 +171,11 @@ class Wire:
         self._outlets.clear()
 
     def _declare(self, topic: str) -> Outlet:
+        if not self.may_publish(topic):
+            raise UsageError(
+                f"{self._layout.key(topic)}: our keys do not let us publish there; docs/security.md says who "
+                "may; were they made for this scenario, with guards where there are some?"
+            )
         with self._lock:
             if (declared := self._outlets.get(topic)) is not None:
                 return declared
@@ -207,8 +228,9 @@ def joined(
     No more is taken in than any sane lab sends.
     The rest is as of :func:`hil.wire.session.open_session`, and so is what it raises.
     """
+    allowed = allowed_keys(endpoints)
     session = open_session(endpoints, patience, give_up)
-    wire = Wire(session, urgent_topics(scenario), layout_of(scenario), node)
+    wire = Wire(session, urgent_topics(scenario), layout_of(scenario), node, allowed)
     clock = tell_time(session)
     wire.inbox.intake = intake_of(scenario)
     try:

@@ -58,6 +58,21 @@ def all_tokens(layout: KeyLayout) -> str:
     return layout.within(f"@ros2_lv/{layout.domain}/**")
 
 
+def node_tokens(layout: KeyLayout) -> str:
+    """Key expression of the tokens of all nodes."""
+    if layout.kind == "ros2dds":
+        return "@/*/@ros2_lv"
+    return layout.within(f"@ros2_lv/{layout.domain}/*/*/*/NN/*/*/*")
+
+
+def topic_tokens(layout: KeyLayout, topic: str, *, publishes: bool) -> str:
+    """Key expression of the tokens of all publishers of a topic, or of all subscriptions to it."""
+    kind, name = _PUBLISHER if publishes else _SUBSCRIPTION, layout.name(topic)
+    if layout.kind == "ros2dds":
+        return f"@/*/@ros2_lv/{kind}/{layout.within(name).replace('/', '§')}/*/*"
+    return layout.within(f"@ros2_lv/{layout.domain}/*/*/*/{kind}/*/*/*/%{name.replace('/', '%')}/*/*/*")
+
+
 def endpoint_in(layout: KeyLayout, token: str) -> Endpoint | None:
     """The publisher or subscription that a token stands for; None for one that stands for something else."""
     own = layout.within("")

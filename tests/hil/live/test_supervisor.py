@@ -41,6 +41,9 @@ class Lab:
     def publish(self, topic: str, payload: bytes) -> None:
         self.sent.append((topic, payload))
 
+    def may_publish(self, topic: str) -> bool:
+        return topic in (PAIR.cmd_vel, topics.STOP)
+
     def update(self) -> Snapshot:
         moving = SimpleNamespace(v1=0.0, u1=0.0, v2=0.1 if self.now < self._coasts else 0.0, u2=0.0)
         return Snapshot((PAIR.follower,), truths={PAIR.follower: moving} if self._seen else {})  # type: ignore[dict-item]
