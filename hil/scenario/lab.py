@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import UNSET, Meta, UnsetType
 
-from hil.scenario.section import Namespace, NonNegative, Positive, Section
+from hil.scenario.section import Factor, Namespace, Section, Span
 
 SourceType = Literal[
     "RigidBodies",
@@ -35,8 +35,8 @@ class SourceSection(Section, frozen=True, kw_only=True):
     topic: str = ""
     stamp: Literal["header", "receive"] = "header"
     up: Literal["z", "y"] = "z"
-    scale: Positive = 1.0
-    pair_within_s: NonNegative = 0.002
+    scale: Factor = 1.0
+    pair_within_s: Span = 0.002
     emulated: Literal["", "leader", "follower"] = ""
 
 

@@ -74,7 +74,7 @@ def test_mistakes_are_named(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"controller\.tilt"):
         load_scenario("chain5", ["controller.tilt=1.6"])
     with pytest.raises(CheckFailedError, match="breaks down"):
-        report_of("chain5", 'leader.program={kind = "constant", v = 1e12}')
+        report_of("chain5", 'leader.program={kind = "constant", v = 100.0}')
     (tmp_path / "file").write_text("")
     with pytest.raises(UsageError, match="--out"):
         report_of("chain5", "run.duration_s=0.1", out=tmp_path / "file" / "below")
