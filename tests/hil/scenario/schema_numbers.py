@@ -9,7 +9,21 @@ import msgspec
 
 from hil.scenario.schema import Scenario
 
-HUGE = 9_999_999_999_999_999_999_999
+ABSURD = (
+    0,
+    -1,
+    1e300,
+    -1e300,
+    1e-300,
+    5e-324,
+    9_999_999_999_999_999_999_999,
+    10**400,
+    1e9,
+    "inf",
+    "-inf",
+    "nan",
+)
+"""Values that are given to every number in turn, besides the ends of its range."""
 
 
 class Number(NamedTuple):
@@ -24,13 +38,14 @@ class Number(NamedTuple):
     low: float | None
     high: float | None
 
+    @property
+    def values(self) -> tuple[object, ...]:
+        """All that it is given."""
+        return (*ABSURD, *(each for each in (self.low, self.high) if each is not None))
+
     def override(self, value: object) -> str:
         """The override that gives it a value."""
-        return f"{self.key}={self.text % _toml(value)}"
-
-
-def _toml(value: object) -> str:
-    return str(value)
+        return f"{self.key}={self.text % value}"
 
 
 FAULTS = {
@@ -63,7 +78,10 @@ def _numbers_of(section: str, field: msgspec.structs.FieldInfo) -> Iterator[Numb
         for inner in msgspec.structs.fields(kind):
             for place, (low, high) in enumerate(_leaves(inner.type)):
                 text = f"{inner.name} = %s" if place == 0 and not _is_tuple(inner.type) else None
-                text = text or f"{inner.name} = [" + ", ".join("%s" if k == place else "0.0" for k in (0, 1)) + "]"
+                text = (
+                    text
+                    or f"{inner.name} = [" + ", ".join("%s" if k == place else "0.0" for k in (0, 1)) + "]"
+                )
                 whole = FAULTS[key] % text
                 if inner.name == "at_s":
                     whole = whole.replace("at_s = 0.05, ", "")
