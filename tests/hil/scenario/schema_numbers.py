@@ -9,20 +9,7 @@ import msgspec
 
 from hil.scenario.schema import Scenario
 
-ABSURD = (
-    0,
-    -1,
-    1e300,
-    -1e300,
-    1e-300,
-    5e-324,
-    9_999_999_999_999_999_999_999,
-    10**400,
-    1e9,
-    "inf",
-    "-inf",
-    "nan",
-)
+ABSURD = (0, -1, 1e300, -1e300, 1e-300, 5e-324, 10**22 - 1, 10**400, 1e9, "inf", "-inf", "nan")
 """Values that are given to every number in turn, besides the ends of its range."""
 
 
@@ -77,12 +64,8 @@ def _numbers_of(section: str, field: msgspec.structs.FieldInfo) -> Iterator[Numb
         (kind,) = _structs(field.type)
         for inner in msgspec.structs.fields(kind):
             for place, (low, high) in enumerate(_leaves(inner.type)):
-                text = f"{inner.name} = %s" if place == 0 and not _is_tuple(inner.type) else None
-                text = (
-                    text
-                    or f"{inner.name} = [" + ", ".join("%s" if k == place else "0.0" for k in (0, 1)) + "]"
-                )
-                whole = FAULTS[key] % text
+                pair = "[%s, 0.0]" if place == 0 else "[0.0, %s]"
+                whole = FAULTS[key] % f"{inner.name} = {pair if _is_tuple(inner.type) else '%s'}"
                 if inner.name == "at_s":
                     whole = whole.replace("at_s = 0.05, ", "")
                 yield Number(key, given, whole, low, high)

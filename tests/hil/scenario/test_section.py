@@ -1,4 +1,4 @@
-"""No number of a scenario is absurd enough for a traceback or a hang: it is refused in one line, or it runs."""
+"""No number is absurd enough for a traceback or a hang: a scenario is refused in one line, or it runs."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from tests.hil.absurd_scenarios import Number, numbers
 
 from hil.errors import AbreastError, UsageError
 from hil.judge.run_data import run_data_of_log
@@ -16,6 +15,7 @@ from hil.log.metadata import scenario_of
 from hil.log.reader import read_log
 from hil.scenario.files import build_scenario, load_scenario, refuse_unrunnable, scenario_text
 from hil.scenario.schema import Scenario
+from tests.hil.scenario.schema_numbers import Number, numbers
 
 MANY_AGENTS = 10
 """More than these are no absurdity, and take their time."""
@@ -24,19 +24,23 @@ NUMBERS = list(numbers())
 NAMES = [f"{each.key} {each.text}" for each in NUMBERS]
 
 
+def one_line(refused: AbreastError) -> None:
+    assert "\n" not in str(refused)
+
+
 def loaded(number: Number, value: object) -> Scenario | None:
     """The scenario with a value, None where it is refused in one line."""
     try:
         return load_scenario("turtlebot3", ["run.duration_s=0.3", *number.given, number.override(value)])
-    except UsageError as error:
-        assert "\n" not in str(error)
+    except UsageError as refused:
+        one_line(refused)
         return None
 
 
 def takes_its_time(number: Number, value: object) -> bool:
     if number.key.endswith(".agents"):
         return isinstance(value, int) and MANY_AGENTS < value <= 2000
-    return number.key == "run.duration_s" and value == number.high
+    return bool(number.key == "run.duration_s" and value == number.high)
 
 
 def test_every_number_is_known() -> None:
@@ -64,8 +68,8 @@ def runs(number: Number, value: object, folder: Path) -> None:
         read = read_log(log)
         assert scenario_of(read) == scenario
         summarise(run_data_of_log(read))
-    except AbreastError as error:
-        assert "\n" not in str(error)
+    except AbreastError as refused:
+        one_line(refused)
 
 
 @pytest.mark.slow
