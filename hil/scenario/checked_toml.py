@@ -7,6 +7,7 @@ import difflib
 import math
 import re
 import tomllib
+import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeGuard, TypeVar, get_args, get_origin
@@ -90,10 +91,14 @@ def nearest(word: str, known: Iterable[str]) -> str:
 def _refuse_above(largest: float, node: object, source: str, path: str) -> None:
     if isinstance(node, Mapping):
         for key, value in node.items():
+            _refuse_above(largest, key, source, f"a key of {path or 'the top level'}")
             _refuse_above(largest, value, source, f"{path}.{key}" if path else str(key))
     elif isinstance(node, Sequence) and not isinstance(node, str):
         for value in node:
             _refuse_above(largest, value, source, path)
+    elif isinstance(node, str) and not _is_text(node):
+        shown = ascii(node[:40])
+        raise UsageError(f"{source}: {path} is {shown}, expected text without control characters")
     elif isinstance(node, int) and abs(node) > _LARGEST_INTEGER:
         digits = int(math.log10(abs(node))) + 1
         raise UsageError(f"{source}: {path} is a number of {digits} digits, expected one up to {LARGEST:g}")
@@ -101,6 +106,11 @@ def _refuse_above(largest: float, node: object, source: str, path: str) -> None:
         raise UsageError(f"{source}: {path} is {node}, expected a finite number")
     elif isinstance(node, float) and abs(node) > largest:
         raise UsageError(f"{source}: {path} is {node:g}, expected a number up to {largest:g}")
+
+
+def _is_text(given: str) -> bool:
+    """Whether a text can be written down and read again, line ends and tabs included."""
+    return not any(unicodedata.category(each) in ("Cc", "Cs") and each not in "\n\t\r" for each in given)
 
 
 def _explain(error: str, tree: Mapping[str, Any], kind: type[msgspec.Struct]) -> str:
