@@ -52,15 +52,17 @@ def refuse_unwritable(path: Path, option: str) -> None:
     """Raise :class:`UsageError` for a file that cannot be written; ``option``: what gave it."""
     try:
         if path.is_dir():
-            raise UsageError(f"{option} {path}: is a folder; give a file")
+            raise UsageError(f"{option} {path}: cannot be written (it is a folder); give a file")
         there, folder = path.exists(), path.parent
         # Pipes and devices are there, and who may write to them may.
         if not there and not folder.is_dir():
-            raise UsageError(f"{option} {path}: there is no folder {folder}; make it, or give another file")
+            raise UsageError(
+                f"{option} {path}: cannot be written (there is no folder {folder}); make it, or give another"
+            )
     except OSError as error:
-        raise UsageError(f"{option} {path}: {error.strerror}; give another file") from None
+        raise UsageError(f"{option} {path}: cannot be written ({error.strerror}); give another") from None
     if not os.access(path if there else folder, os.W_OK if there else os.W_OK | os.X_OK):
-        raise UsageError(f"{option} {path}: may not be written; give another file")
+        raise UsageError(f"{option} {path}: cannot be written (permission denied); give another file")
 
 
 def new_folder(name: str) -> Path:

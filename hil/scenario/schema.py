@@ -35,6 +35,7 @@ from hil.scenario.section import (
     Resolution,
     Section,
     Share,
+    SourceTime,
     Span,
     Speed,
     SpeedLimit,
@@ -61,7 +62,7 @@ class RunSection(Section, frozen=True, kw_only=True):
 
     duration_s: Duration = 30.0
     seed: Annotated[int, Meta(ge=0, le=2**62)] = 1
-    evaluate_from_s: Moment = 15.0
+    evaluate_from_s: SourceTime = 15.0
 
 
 class FormationSection(Section, frozen=True, kw_only=True):

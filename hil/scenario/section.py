@@ -22,6 +22,8 @@ Gain = Annotated[float, Meta(ge=1e-6, le=1e4)]
 Frequency = Annotated[float, Meta(ge=1e-6, le=1e4)]
 Rate = Annotated[float, Meta(ge=0.01, le=10_000.0)]
 Duration = Annotated[float, Meta(ge=1e-6, le=1e7)]
+SourceTime = Annotated[float, Meta(ge=0.0, le=9e9)]
+"""A time [s] that may count from 1970, as recordings do."""
 Moment = Annotated[float, Meta(ge=0.0, le=1e7)]
 """A time [s] since something began."""
 Patience = Annotated[float, Meta(ge=1e-3, le=100.0)]
