@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import sys
 from collections.abc import Sequence
@@ -10,7 +11,7 @@ import click
 
 from formation.collector import collector_paused
 from hil import __version__
-from hil.errors import AbreastError
+from hil.errors import AbreastError, UsageError
 
 COMMANDS = {
     "run": "the main job: emulated robots, estimator, controller, recorder; live or in lockstep",
@@ -37,6 +38,9 @@ COMMANDS = {
     "secure": "keys by which a router knows who is who, and what each may do",
     "bridge": "motion captures of others brought to the wire, as a daemon",
 }
+_OF_NAMES = (errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.EACCES)
+"""What is wrong with a name that was given, and not with the machine."""
+
 _MODULES = {"import": "import_recording"}
 _DAEMONS = ("emulator", "follower", "estimator", "controller", "leader", "recorder")
 
@@ -72,10 +76,10 @@ def abreast() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the console script and exit: 0 done, 1 a check failed, 2 bad usage or bad input, 130 Ctrl-C."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        code = abreast.main(
-            args=None if arguments is None else list(arguments), prog_name="abreast", standalone_mode=False
-        )
+        _refuse_no_text(given)
+        code = abreast.main(args=given, prog_name="abreast", standalone_mode=False)
     except click.UsageError as error:
         where = error.ctx.command_path if error.ctx else "abreast"
         _say(f"{where}: {error.format_message()} (see `{where} --help`)")
@@ -95,12 +99,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except OSError as error:
         # A full disk, say, on the way.
         _say(f"abreast: {error.filename or 'a file'}: {error.strerror or error}")
-        code = 1
+        code = 2 if error.errno in _OF_NAMES else 1
     sys.exit(code if isinstance(code, int) else 0)
 
 
+def _refuse_no_text(arguments: Sequence[str]) -> None:
+    """Raise :class:`UsageError` for a NUL, which no name of a file and no text may hold."""
+    for argument in arguments:
+        if "\0" in argument:
+            raise UsageError(f"argument {argument!r}: has a NUL character; leave it out")
+
+
 def _say(line: str) -> None:
-    click.echo(" ".join(line.split()), err=True)
+    # Names of files may be no text.
+    shown = line.encode("utf-8", "backslashreplace").decode()
+    click.echo(" ".join(shown.split()), err=True)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from formation.collector import collector_paused
 from hil.commands.daemon_workers import WORKERS, Order, on_report, overheard, serve_alone, watch_of
 from hil.commands.guard_option import NO_GUARD
 from hil.commands.natnet_options import NatNetOptions, natnet_options
+from hil.commands.outputs import OutputFile
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION, Seconds
 from hil.commands.wire_options import endpoints_of, wire_options
@@ -82,7 +83,6 @@ def daemon_command(name: str, summary: str) -> click.Command:
         if dropped:
             click.echo(f"abreast {name}: {dropped} messages came too fast and were dropped", err=True)
 
-    path = click.Path(path_type=Path, dir_okay=False)
     options: list[click.Parameter] = [
         click.Argument(["scenario"]),
         *wire_options(),
@@ -91,7 +91,9 @@ def daemon_command(name: str, summary: str) -> click.Command:
         click.Option(["--tethered"], is_flag=True, hidden=True),
     ]
     if name == "recorder":
-        options.append(click.Option(["--out"], type=path, required=True, help="Log to write (.mcap)."))
+        options.append(
+            click.Option(["--out"], type=OutputFile(), required=True, help="Log to write (.mcap).")
+        )
     if name in HOSTED:
         whom = "A follower of a chain to serve, by its name; may be given again. Without it all."
         options.append(click.Option(["--follower", "followers"], multiple=True, metavar="NAME", help=whom))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal, TypeVar
 
 import click
 
+from hil.commands.outputs import OutputFile, refuse_unwritable
 from hil.errors import AbreastError, UsageError
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ def command() -> None:
 def _target(function: Callback) -> Callback:
     """Options of what is written, and by which scenario."""
     options = (
-        click.option("--out", type=click.Path(path_type=Path), metavar="LOG", help="The log to write."),
+        click.option("--out", type=OutputFile(), metavar="LOG", help="The log to write."),
         click.option("--map", "chart", metavar="FILE", help="Column map: a TOML file or a shipped name."),
         click.option(
             "--scenario", metavar="NAME", help="Scenario without a map: a shipped name or a TOML file."
@@ -61,6 +62,7 @@ def import_table(
     from hil.recordings.track_import import import_recording
 
     log = out or Path(f"{recording.stem}.mcap")
+    refuse_unwritable(log, "--out")
     used = _chart(recording.stem, chart, scenario, overrides)
     _tell(str(recording), log, import_recording(recording, used, log, leader, follower))
 
@@ -81,6 +83,7 @@ def import_tum_pair(
     from hil.recordings.track_import import import_tum
 
     log = out or Path(f"{leader.stem}_{follower.stem}.mcap")
+    refuse_unwritable(log, "--out")
     used = _chart(log.stem, chart, scenario, overrides)
     _tell(f"{leader}, {follower}", log, import_tum(leader, follower, used, log))
 
@@ -117,9 +120,7 @@ def _tell(recording: str, log: Path, done: Imported) -> None:
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--leader", required=True, type=int, metavar="N", help="Number of the robot that leads.")
 @click.option("--follower", required=True, type=int, metavar="N", help="Number of the robot that follows.")
-@click.option(
-    "--out", required=True, type=click.Path(path_type=Path), metavar="LOG", help="The log to write."
-)
+@click.option("--out", required=True, type=OutputFile(), metavar="LOG", help="The log to write.")
 @click.option(
     "--sightings",
     type=click.Choice(["vicon", "camera"]),

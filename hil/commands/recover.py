@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from hil.commands.outputs import OutputFile
 from hil.errors import CheckFailedError
 from hil.log.report_json import print_json
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 @click.command("recover")
 @click.argument("log", type=click.Path(path_type=Path))
-@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="LOG", help="The whole log.")
+@click.option("--out", required=True, type=OutputFile(), metavar="LOG", help="The whole log.")
 @click.option("--json", "as_json", is_flag=True, help="Print what came of it as one JSON object on stdout.")
 def command(log: Path, out: Path, as_json: bool) -> None:
     """Copy all that is whole in LOG to a new log that every reader opens.

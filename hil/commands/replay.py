@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from formation.collector import collector_paused
+from hil.commands.outputs import OutputFile, OutputFolder
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
 from hil.log.report_json import print_json, print_text, results_apart
@@ -34,10 +35,8 @@ if TYPE_CHECKING:
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key.")
 @click.option("--from", "from_s", type=Seconds(), metavar="S", help="Judge from here on.")
 @click.option("--to", "to_s", type=Seconds(), metavar="S", help="Judge up to here.")
-@click.option("--csv", "table", type=click.Path(path_type=Path), metavar="FILE", help="Write the estimates.")
-@click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Folder for results."
-)
+@click.option("--csv", "table", type=OutputFile(), metavar="FILE", help="Write the estimates.")
+@click.option("--out", type=OutputFolder(), metavar="DIR", help="Folder for results.")
 @click.option(
     "--strict", is_flag=True, help="Fail if an error lies outside its extended bound or certified radius."
 )

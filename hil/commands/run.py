@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,6 +12,7 @@ import click
 
 from formation.collector import collector_paused
 from hil.commands.guard_option import NO_GUARD
+from hil.commands.outputs import OutputFolder, new_folder
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION, Seconds
 from hil.commands.wire_options import DEFAULT_ENDPOINT, SECURE_ENDPOINT
@@ -39,9 +39,7 @@ if TYPE_CHECKING:
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all noise.")
 @click.option("--estimator", metavar="E", help="Estimator: ekf, ukf, imm, or file.py:factory.")
 @click.option("--law", metavar="L", help="Law of the follower: independent, or file.py:function.")
-@click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Folder for results."
-)
+@click.option("--out", type=OutputFolder(), metavar="DIR", help="Folder for results.")
 @click.option(
     "--lockstep", is_flag=True, help="On a simulated clock, as fast as it goes; same seed, same bytes."
 )
@@ -231,7 +229,7 @@ def _interrupted(outcome: Outcome) -> str:
 
 
 def _folder(scenario: Scenario, out: Path | None) -> Path:
-    return made_folder(out or Path("runs") / f"{scenario.name}-{time.strftime('%Y%m%d-%H%M%S')}")
+    return new_folder(scenario.name) if out is None else made_folder(out)
 
 
 @collector_paused()

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from hil.commands.outputs import OutputFolder
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION
 from hil.log.report_json import print_json, results_apart
@@ -17,7 +18,7 @@ from hil.scenario.files import load_scenario
 @click.argument("scenario", default="turtlebot3")
 @click.option("--law", help="Law in place of the scenario's, file.py:function too.")
 @click.option("--duration", type=DURATION, help="Seconds to simulate.")
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for pictures and CSV.")
+@click.option("--out", type=OutputFolder(), help="Folder for pictures and CSV.")
 @click.option("--stability", is_flag=True, help="Check the propositions of the paper, too; a pair only.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")

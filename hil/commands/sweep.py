@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
 import click
 
+from hil.commands.outputs import OutputFolder, new_folder
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
@@ -42,9 +42,7 @@ from hil.sweep.spec import Sweep, load_sweep
     metavar="CELL:RUN",
     help="Also write this run as a full log with its report; 'worst': that of each estimator.",
 )
-@click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Folder for results."
-)
+@click.option("--out", type=OutputFolder(), metavar="DIR", help="Folder for results.")
 @click.option("--json", "as_json", is_flag=True, help="Print the results as one JSON object on stdout.")
 @results_apart()
 def command(
@@ -76,7 +74,7 @@ def command(
     for point in sweep.cells()[: len(sweep.spec.estimators)]:
         load_own_parts(sweep.scenario_of(point))
     to_keep = [_parsed(sweep, text) for text in kept if text != "worst"]
-    folder = out or Path("runs") / f"sweep-{time.strftime('%Y%m%d-%H%M%S')}"
+    folder = out or new_folder("sweep")
     result = _fly(sweep, folder, workers or len(os.sched_getaffinity(0)), scheduler)
     if "worst" in kept:
         to_keep += worst_runs(result)

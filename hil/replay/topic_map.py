@@ -20,7 +20,7 @@ from hil.scenario.checked_toml import checked, locate, read_toml
 from hil.scenario.files import Overrides, merged_scenario, with_overrides
 from hil.scenario.links import refuse_chain
 from hil.scenario.schema import Scenario
-from hil.scenario.section import NonNegative, Positive
+from hil.scenario.section import Factor, Span
 
 MAPS = "maps"
 
@@ -62,8 +62,8 @@ class TopicNames(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     stamps: Literal["header", "log"] = "header"
     stamp: Literal["header", "receive"] | None = None
     up: Literal["z", "y"] | None = None
-    scale: Positive | None = None
-    pair_within_s: NonNegative = 0.002
+    scale: Factor | None = None
+    pair_within_s: Span = 0.002
 
 
 class BodyNames(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

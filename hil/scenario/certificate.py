@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from estimation.bounds.certificate import Certificate
 
 
+_STANDS = 1e-9
+"""What drives more slowly [m/s] stands, for all that can be told of it."""
+
+
 def certificate_of(scenario: Scenario, *, driven: bool = True) -> Certificate:
     """Certificate of a scenario; ``driven``: its program drives the leader, which tells the speeds.
 
@@ -102,7 +106,7 @@ def _speeds(scenario: Scenario) -> SpeedRange:
     program = scenario.leader.program
     driven = program.v if isinstance(program, TableProgram) else [program.v]
     speeds = [abs(v) for v in driven]
-    if min(speeds) <= 0.0 or min(driven) < 0.0 < max(driven):
+    if min(speeds) < _STANDS or min(driven) < 0.0 < max(driven):
         return SpeedRange(scenario.leader.v_eps, scenario.leader.k_v)
     return SpeedRange(min(speeds), max(speeds))
 

@@ -7,6 +7,7 @@ import difflib
 import math
 import re
 import tomllib
+import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeGuard, TypeVar, get_args, get_origin
@@ -19,6 +20,8 @@ T = TypeVar("T", bound=msgspec.Struct)
 
 LARGEST = 1e12
 """No number of a lab is above this, and squares of larger ones lose their meaning."""
+
+_LARGEST_INTEGER = 2**63 - 1  # that TOML holds
 
 _UNKNOWN = re.compile(r"unknown field `(?P<key>[^`]*)`(?: - at `\$\.?(?P<path>[^`]*)`)?")
 _AT = re.compile(r"^(?P<what>.*?)(?: - at `\$\.?(?P<path>[^`]*)`)?$", re.DOTALL)
@@ -70,7 +73,7 @@ def checked(tree: Mapping[str, Any], kind: type[T], source: str) -> T:
         _refuse_above(math.inf, tree, source, "")
         result = msgspec.convert(tree, kind)
         # Only now, as a key's own range says more.
-        _refuse_above(LARGEST, tree, source, "")
+        _refuse_above(LARGEST, msgspec.to_builtins(result), source, "")
         return result
     except RecursionError:
         raise UsageError(f"{source}: sections nested too deeply; leave out what does not belong") from None
@@ -88,14 +91,26 @@ def nearest(word: str, known: Iterable[str]) -> str:
 def _refuse_above(largest: float, node: object, source: str, path: str) -> None:
     if isinstance(node, Mapping):
         for key, value in node.items():
+            _refuse_above(largest, key, source, f"a key of {path or 'the top level'}")
             _refuse_above(largest, value, source, f"{path}.{key}" if path else str(key))
     elif isinstance(node, Sequence) and not isinstance(node, str):
         for value in node:
             _refuse_above(largest, value, source, path)
+    elif isinstance(node, str) and not _is_text(node):
+        shown = ascii(node[:40])
+        raise UsageError(f"{source}: {path} is {shown}, expected text without control characters")
+    elif isinstance(node, int) and abs(node) > _LARGEST_INTEGER:
+        digits = int(math.log10(abs(node))) + 1
+        raise UsageError(f"{source}: {path} is a number of {digits} digits, expected one up to {LARGEST:g}")
     elif isinstance(node, float) and not math.isfinite(node):
         raise UsageError(f"{source}: {path} is {node}, expected a finite number")
     elif isinstance(node, float) and abs(node) > largest:
         raise UsageError(f"{source}: {path} is {node:g}, expected a number up to {largest:g}")
+
+
+def _is_text(given: str) -> bool:
+    """Whether a text can be written down and read again, line ends and tabs included."""
+    return not any(unicodedata.category(each) in ("Cc", "Cs") and each not in "\n\t\r" for each in given)
 
 
 def _explain(error: str, tree: Mapping[str, Any], kind: type[msgspec.Struct]) -> str:

@@ -7,7 +7,23 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from hil.scenario.section import MountTriple, NonNegative, Positive, Probability, Rate, Section, Span
+from hil.scenario.section import (
+    Acceleration,
+    Angle,
+    Coordinate,
+    Factor,
+    Lag,
+    Moment,
+    MountTriple,
+    Noise,
+    Probability,
+    Rate,
+    Resolution,
+    Section,
+    Span,
+    SpeedLimit,
+    TurnLimit,
+)
 
 
 class OdometryFaultSection(Section, frozen=True, kw_only=True):
@@ -21,9 +37,9 @@ class OdometryFaultSection(Section, frozen=True, kw_only=True):
     """
 
     kind: Literal["silent", "nan", "zero", "reversed", "scale", "delay", "slip", "reset", "commands"]
-    at_s: NonNegative
-    duration_s: NonNegative = 0.0
-    factor: float = 0.5
+    at_s: Moment
+    duration_s: Moment = 0.0
+    factor: Annotated[float, Meta(ge=-1e3, le=1e3)] = 0.5
     delay_s: Span = 0.2
 
 
@@ -36,19 +52,19 @@ class RobotSection(Section, frozen=True, kw_only=True):
     motion times ``odometry_scale_v`` and ``odometry_scale_u``; its pose adds that up, without noise.
     """
 
-    lag_s: NonNegative = 0.1
-    v_max: Positive = 0.22
-    u_max: Positive = 2.84
-    v_rate: NonNegative = 0.0
-    u_rate: NonNegative = 0.0
-    v_resolution: NonNegative = 0.01
-    u_resolution: NonNegative = 0.01
+    lag_s: Lag = 0.1
+    v_max: SpeedLimit = 0.22
+    u_max: TurnLimit = 2.84
+    v_rate: Acceleration = 0.0
+    u_rate: Acceleration = 0.0
+    v_resolution: Resolution = 0.01
+    u_resolution: Resolution = 0.01
     odometry_rate_hz: Rate = 30.0
-    odometry_sigma_v: NonNegative = 0.002
-    odometry_sigma_u: NonNegative = 0.01
+    odometry_sigma_v: Noise = 0.002
+    odometry_sigma_u: Noise = 0.01
     odometry_delay_s: Span = 0.0
-    odometry_scale_v: Positive = 1.0
-    odometry_scale_u: Positive = 1.0
+    odometry_scale_v: Factor = 1.0
+    odometry_scale_u: Factor = 1.0
     odometry_faults: tuple[OdometryFaultSection, ...] = ()
 
 
@@ -61,11 +77,11 @@ class FaultSection(Section, frozen=True, kw_only=True):
     """
 
     kind: Literal["step", "turn", "swap", "freeze", "dropout"]
-    at_s: NonNegative
-    duration_s: NonNegative = 0.0
+    at_s: Moment
+    duration_s: Moment = 0.0
     body: Literal["leader", "follower", "both"] = "leader"
-    offset: tuple[float, float] = (0.02, 0.0)
-    angle: float = math.pi
+    offset: tuple[Coordinate, Coordinate] = (0.02, 0.0)
+    angle: Angle = math.pi
 
 
 class MocapSection(Section, frozen=True, kw_only=True):
@@ -78,8 +94,8 @@ class MocapSection(Section, frozen=True, kw_only=True):
     """
 
     rate_hz: Rate = 120.0
-    sigma_position: NonNegative = 0.0003
-    sigma_heading: NonNegative = 0.0035
+    sigma_position: Noise = 0.0003
+    sigma_heading: Noise = 0.0035
     static_fraction: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.05
     latency_s: Span = 0.03
     jitter_s: Span = 0.0
@@ -87,7 +103,7 @@ class MocapSection(Section, frozen=True, kw_only=True):
     clock_offset_s: Annotated[float, Meta(ge=-1.7e9, le=1e8)] = 0.0
     clock_drift_ppm: Annotated[float, Meta(ge=-500.0, le=500.0)] = 0.0
     clock_jump_s: Annotated[float, Meta(ge=-1e7, le=1e7)] = 0.0
-    clock_jump_at_s: NonNegative = 0.0
+    clock_jump_at_s: Moment = 0.0
     leader_mount: MountTriple = (0.0, 0.0, 0.0)
     follower_mount: MountTriple = (0.0, 0.0, 0.0)
     faults: tuple[FaultSection, ...] = ()

@@ -13,7 +13,7 @@ import tomli_w
 from hil.errors import UsageError
 from hil.scenario.brought import refuse_unknown, settle_references
 from hil.scenario.checked_toml import checked, locate, read_toml, shipped_names
-from hil.scenario.links import refuse_chain
+from hil.scenario.links import refuse_chain, refuse_contradictions
 from hil.scenario.schema import OFFLINE_ESTIMATORS, Scenario
 
 _FOLDER = "scenarios"
@@ -82,6 +82,7 @@ def build_scenario(tree: Mapping[str, Any], *overrides: Overrides, source: str =
     settle_references(merged, Path.cwd())
     scenario = checked(merged, Scenario, source)
     refuse_unknown(scenario, source)
+    refuse_contradictions(scenario)
     return scenario
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import UNSET, Meta, UnsetType
 
-from hil.scenario.section import Namespace, NonNegative, Positive, Section
+from hil.scenario.section import Coordinate, Factor, Moment, Namespace, Patience, Section, Span
 
 SourceType = Literal[
     "RigidBodies",
@@ -35,8 +35,8 @@ class SourceSection(Section, frozen=True, kw_only=True):
     topic: str = ""
     stamp: Literal["header", "receive"] = "header"
     up: Literal["z", "y"] = "z"
-    scale: Positive = 1.0
-    pair_within_s: NonNegative = 0.002
+    scale: Factor = 1.0
+    pair_within_s: Span = 0.002
     emulated: Literal["", "leader", "follower"] = ""
 
 
@@ -46,8 +46,8 @@ class RecorderSection(Section, frozen=True, kw_only=True):
     ``rotate_mb``, ``rotate_s``: begin a new file once one has this size or covers this time; 0 for never.
     """
 
-    rotate_mb: NonNegative = 0.0
-    rotate_s: NonNegative = 0.0
+    rotate_mb: Annotated[float, Meta(ge=0.0, le=1e7)] = 0.0
+    rotate_s: Moment = 0.0
 
     @property
     def rotates(self) -> bool:
@@ -81,7 +81,7 @@ class GuardSection(Section, frozen=True, kw_only=True):
     """
 
     present: bool = False
-    age_s: Annotated[float, Meta(gt=0.0, le=10.0)] = 0.15
-    latch_s: Annotated[float, Meta(gt=0.0, le=1e5)] = 1.0
-    fence: tuple[float, float, float, float] | UnsetType = UNSET
-    separation: NonNegative = 0.0
+    age_s: Annotated[float, Meta(ge=1e-3, le=10.0)] = 0.15
+    latch_s: Patience = 1.0
+    fence: tuple[Coordinate, Coordinate, Coordinate, Coordinate] | UnsetType = UNSET
+    separation: Annotated[float, Meta(ge=0.0, le=1e3)] = 0.0

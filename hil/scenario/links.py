@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import msgspec
 from msgspec.structs import replace
@@ -87,18 +87,12 @@ def links_of(scenario: Scenario) -> tuple[Link, ...]:
 
     Raises :class:`UsageError` for names that are too few, too many, or stand for two robots.
     """
-    chain = chain_of(scenario)
+    called, chain = called_of(scenario), chain_of(scenario)
     if chain is None:
-        _differ(scenario, bodies_of(scenario), "leader.body and follower.body")
-        _differ(scenario, namespaces_of(scenario), "leader.namespace and follower.namespace")
         return (Link(scenario),)
-    names = _names(scenario, chain)
-    bodies = _further(scenario, chain, "bodies", chain.bodies, bodies_of(scenario), names)
-    namespaces = _further(scenario, chain, "namespaces", chain.namespaces, namespaces_of(scenario), names)
+    names, bodies, namespaces = called
     poses = [(pose.x, pose.y, pose.theta) for pose in chain_poses(scenario, chain.agents)]
-    control, robot = scenario.controller, scenario.robot
-    k_v = min(control.v_max, robot.v_max) if isinstance(chain.k_v, msgspec.UnsetType) else chain.k_v
-    k_u = min(control.u_max, robot.u_max) if isinstance(chain.k_u, msgspec.UnsetType) else chain.k_u
+    k_v, k_u = chain_limits(scenario, chain)
     links: list[Link] = []
     agents = zip(names, bodies, namespaces, poses, strict=True)
     for place, (ahead, own) in enumerate(pairwise(agents)):
@@ -114,6 +108,72 @@ def links_of(scenario: Scenario) -> tuple[Link, ...]:
         other_bodies = frozenset(bodies) - {ahead[1], own[1]}
         links.append(Link(pair, others, other_bodies, in_chain=True, first=not place))
     return tuple(links)
+
+
+class Called(NamedTuple):
+    """What the robots are called, the leader first: their names, bodies and namespaces."""
+
+    names: tuple[str, ...]
+    bodies: tuple[str, ...]
+    namespaces: tuple[str, ...]
+
+
+def called_of(scenario: Scenario) -> Called:
+    """What the robots of a scenario are called.
+
+    Raises :class:`UsageError` for names that are too few, too many, or stand for two robots.
+    """
+    bodies, namespaces, chain = bodies_of(scenario), namespaces_of(scenario), chain_of(scenario)
+    if chain is None:
+        names: tuple[str, ...] = (scenario.leader.name, scenario.follower.name)
+        _differ(scenario, names, "leader.name and follower.name")
+        _differ(scenario, bodies, "leader.body and follower.body")
+        _differ(scenario, namespaces, "leader.namespace and follower.namespace")
+        return Called(names, bodies, namespaces)
+    names = _names(scenario, chain)
+    return Called(
+        names,
+        _further(scenario, chain, "bodies", chain.bodies, bodies, names),
+        _further(scenario, chain, "namespaces", chain.namespaces, namespaces, names),
+    )
+
+
+def chain_limits(scenario: Scenario, chain: ChainSection) -> tuple[float, float]:
+    """Largest speed and hardest turn of a chain's followers as somebody's predecessor."""
+    control, robot = scenario.controller, scenario.robot
+    k_v = min(control.v_max, robot.v_max) if isinstance(chain.k_v, msgspec.UnsetType) else chain.k_v
+    k_u = min(control.u_max, robot.u_max) if isinstance(chain.k_u, msgspec.UnsetType) else chain.k_u
+    return k_v, k_u
+
+
+def refuse_contradictions(scenario: Scenario) -> None:
+    """Raise :class:`UsageError` for a name of two robots, and for ranges that hold nothing."""
+    called_of(scenario)
+    _refuse_odd_lab(scenario)
+    chain, least = chain_of(scenario), scenario.leader.v_eps
+    limits = [("leader.k_v", scenario.leader.k_v)]
+    if chain is not None and chain.agents > 2:
+        limits.append(("the largest speed of the chain's followers", chain_limits(scenario, chain)[0]))
+    for what, most in limits:
+        if least > most:
+            raise UsageError(
+                f"scenario {scenario.name}: leader.v_eps is {least:g}, expected at most {what}, {most:g}"
+            )
+
+
+def _refuse_odd_lab(scenario: Scenario) -> None:
+    fence, kept = scenario.guard.fence, scenario.recorder
+    if not isinstance(fence, msgspec.UnsetType) and not (fence[0] < fence[2] and fence[1] < fence[3]):
+        raise UsageError(
+            f"scenario {scenario.name}: guard.fence is {list(fence)}, expected x_min, y_min, x_max, y_max, "
+            "each below its max"
+        )
+    for key, value, least in (("rotate_mb", kept.rotate_mb, 0.1), ("rotate_s", kept.rotate_s, 1.0)):
+        if 0.0 < value < least:
+            raise UsageError(
+                f"scenario {scenario.name}: recorder.{key} is {value:g}, expected 0 for never, or at least "
+                f"{least:g}"
+            )
 
 
 def link_of(scenario: Scenario, follower: str) -> Link:

@@ -14,16 +14,34 @@ from msgspec import UNSET, Meta, UnsetType
 from hil.scenario.emulated import MocapSection, RobotSection
 from hil.scenario.lab import GuardSection, RecorderSection, SourceSection, WireSection
 from hil.scenario.section import (
+    Angle,
     BodyName,
+    Coordinate,
+    Deviation,
+    Distance,
+    Duration,
+    Factor,
+    Frequency,
+    Gain,
+    Lag,
+    Moment,
     MountTriple,
     Name,
     Namespace,
-    NonNegative,
+    Noise,
+    Patience,
     PoseTriple,
-    Positive,
     Rate,
+    Resolution,
     Section,
+    Share,
+    SourceTime,
     Span,
+    Speed,
+    SpeedLimit,
+    TurnLimit,
+    TurnRate,
+    Velocity,
 )
 
 LawName = Literal["independent", "ideal", "feedforward", "faded"]
@@ -42,9 +60,9 @@ NoiseName = Literal["estimated", "given"]
 class RunSection(Section, frozen=True, kw_only=True):
     """How long a run lasts, its random seed, and from when on it is judged."""
 
-    duration_s: Positive = 30.0
+    duration_s: Duration = 30.0
     seed: Annotated[int, Meta(ge=0, le=2**62)] = 1
-    evaluate_from_s: NonNegative = 15.0
+    evaluate_from_s: SourceTime = 15.0
 
 
 class FormationSection(Section, frozen=True, kw_only=True):
@@ -54,10 +72,10 @@ class FormationSection(Section, frozen=True, kw_only=True):
     ``change_sides_at_s``: when [s] the follower is told to go to the other side; of a pair only.
     """
 
-    rho_0: Positive
+    rho_0: Distance
     side: Literal["right", "left"] = "right"
     bearing: Annotated[float, Meta(gt=0.0, lt=math.pi)] = 0.5 * math.pi
-    change_sides_at_s: tuple[NonNegative, ...] = ()
+    change_sides_at_s: tuple[Moment, ...] = ()
 
 
 class ControllerSection(Section, frozen=True, kw_only=True):
@@ -76,19 +94,19 @@ class ControllerSection(Section, frozen=True, kw_only=True):
     """
 
     law: str = "independent"
-    mu1: Positive
-    mu2: Positive
-    mu_rho: Positive
+    mu1: Gain
+    mu2: Gain
+    mu_rho: Gain
     tilt: Annotated[float, Meta(ge=0.0, lt=1.57)] = 0.0
     parameters: dict[str, float] | UnsetType = UNSET
-    v_max: Positive = 0.22
-    u_max: Positive = 2.84
-    max_age_s: Positive = 0.2
-    lag_s: Span = 0.1
-    transport_s: Span = 0.0
+    v_max: SpeedLimit = 0.22
+    u_max: TurnLimit = 2.84
+    max_age_s: Patience = 0.2
+    lag_s: Lag = 0.1
+    transport_s: Lag = 0.0
     tick_hz: Rate = 50.0
-    v_resolution: NonNegative = 0.0
-    u_resolution: NonNegative = 0.0
+    v_resolution: Resolution = 0.0
+    u_resolution: Resolution = 0.0
     command_type: Literal["TwistStamped", "Twist"] = "TwistStamped"
     mount_check: Literal["stop", "warn"] = "stop"
 
@@ -96,26 +114,26 @@ class ControllerSection(Section, frozen=True, kw_only=True):
 class ConstantProgram(Section, frozen=True, kw_only=True, tag="constant", tag_field="kind"):
     """Constant speed v and turn rate u."""
 
-    v: NonNegative
-    u: float = 0.0
+    v: Speed
+    u: TurnRate = 0.0
 
 
 class SinusoidProgram(Section, frozen=True, kw_only=True, tag="sinusoid", tag_field="kind"):
     """Constant speed v, turn rate u_mean + u_amplitude * sin(omega * t)."""
 
-    v: NonNegative
-    u_mean: float = 0.0
-    u_amplitude: float
-    omega: Positive
+    v: Speed
+    u_mean: TurnRate = 0.0
+    u_amplitude: TurnRate
+    omega: Frequency
 
 
 class ImpulseProgram(Section, frozen=True, kw_only=True, tag="impulse", tag_field="kind"):
     """Constant speed v, turn rate u_amplitude * exp(-(t - t_centre)^2 / (2 t_width^2))."""
 
-    v: NonNegative
-    u_amplitude: float
-    t_centre: float
-    t_width: Positive
+    v: Speed
+    u_amplitude: TurnRate
+    t_centre: Annotated[float, Meta(ge=-1e7, le=1e7)]
+    t_width: Duration
 
 
 class TableProgram(Section, frozen=True, kw_only=True, tag="table", tag_field="kind"):
@@ -124,9 +142,9 @@ class TableProgram(Section, frozen=True, kw_only=True, tag="table", tag_field="k
     With v < 0 the leader drives backwards: alpha1 is that of its direction of travel, and v1 = abs(v).
     """
 
-    t: list[float]
-    v: list[float]
-    u: list[float]
+    t: list[Annotated[float, Meta(ge=-1e7, le=1e7)]]
+    v: list[Velocity]
+    u: list[TurnRate]
 
 
 class LeaderSection(Section, frozen=True, kw_only=True):
@@ -144,9 +162,9 @@ class LeaderSection(Section, frozen=True, kw_only=True):
     name: Name = "leader"
     body: BodyName | UnsetType = UNSET
     namespace: Namespace | UnsetType = UNSET
-    v_eps: Positive = 0.02
-    k_v: Positive
-    k_u: Positive
+    v_eps: SpeedLimit = 0.02
+    k_v: SpeedLimit
+    k_u: TurnLimit
     mount: MountTriple = (0.0, 0.0, 0.0)
 
 
@@ -206,36 +224,36 @@ class EstimatorSection(Section, frozen=True, kw_only=True):
     stamp_offset_s: Annotated[float, Meta(ge=-1e5, le=1e5)] = 0.0
     align_odometry: bool = False
     noise: NoiseName = "estimated"
-    sigma_position: Positive = 0.0003
-    sigma_heading: Positive = 0.0035
-    sigma_range: Positive = 0.01
-    sigma_bearing: Positive = 0.02
-    sensor_x: float = 0.0
-    sensor_y: float = 0.0
-    range_bias: float = 0.0
-    bearing_bias: float = 0.0
+    sigma_position: Deviation = 0.0003
+    sigma_heading: Deviation = 0.0035
+    sigma_range: Deviation = 0.01
+    sigma_bearing: Deviation = 0.02
+    sensor_x: Coordinate = 0.0
+    sensor_y: Coordinate = 0.0
+    range_bias: Coordinate = 0.0
+    bearing_bias: Angle = 0.0
     bias_states: bool = False
-    sigma_range_bias: Positive = 0.05
-    sigma_bearing_bias: Positive = 0.1
-    sigma_v2: Positive = 0.005
-    sigma_u2: Positive = 0.03
-    input_delay_s: NonNegative = 0.0
-    input_lag_s: NonNegative = 0.0
-    input_time_constant_s: NonNegative = 0.0
-    input_scale_v: Positive = 1.0
-    input_scale_u: Positive = 1.0
-    slip_v2: NonNegative = 0.1
-    slip_u2: NonNegative = 0.1
-    settled_heading: NonNegative = 0.0
-    turn_bandwidth: Positive = 0.5
-    speed_bandwidth: Positive = 0.01
+    sigma_range_bias: Deviation = 0.05
+    sigma_bearing_bias: Deviation = 0.1
+    sigma_v2: Deviation = 0.005
+    sigma_u2: Deviation = 0.03
+    input_delay_s: Lag = 0.0
+    input_lag_s: Lag = 0.0
+    input_time_constant_s: Lag = 0.0
+    input_scale_v: Factor = 1.0
+    input_scale_u: Factor = 1.0
+    slip_v2: Share = 0.1
+    slip_u2: Share = 0.1
+    settled_heading: Share = 0.0
+    turn_bandwidth: Frequency = 0.5
+    speed_bandwidth: Frequency = 0.01
     process_noise: ProcessNoiseSource = "estimated"
     gate_probability: Annotated[float, Meta(gt=0.5, lt=1.0)] = 0.9999
-    reacquire_frames: Annotated[int, Meta(ge=2)] = 5
-    coast_after_s: Positive = 0.25
-    lost_after_s: Positive = 1.0
-    window_s: NonNegative = 0.2
-    difference_cutoff_s: Positive = 0.1
+    reacquire_frames: Annotated[int, Meta(ge=2, le=1000)] = 5
+    coast_after_s: Patience = 0.25
+    lost_after_s: Patience = 1.0
+    window_s: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.2
+    difference_cutoff_s: Patience = 0.1
     certify: bool = False
 
 
@@ -254,8 +272,8 @@ class ChainSection(Section, frozen=True, kw_only=True):
     names: tuple[Name, ...] = ()
     bodies: tuple[BodyName, ...] = ()
     namespaces: tuple[Namespace, ...] = ()
-    k_v: Positive | UnsetType = UNSET
-    k_u: Positive | UnsetType = UNSET
+    k_v: SpeedLimit | UnsetType = UNSET
+    k_u: TurnLimit | UnsetType = UNSET
 
 
 class FlockSection(Section, frozen=True, kw_only=True):
@@ -270,9 +288,9 @@ class FlockSection(Section, frozen=True, kw_only=True):
 
     agents: Annotated[int, Meta(ge=2, le=2000)]
     neighbours: Annotated[int, Meta(ge=1, le=50)] = 3
-    choose_every_s: Annotated[float, Meta(ge=0.01)] = 0.5
+    choose_every_s: Annotated[float, Meta(ge=0.01, le=1e5)] = 0.5
     least_bearing: Annotated[float, Meta(gt=0.0, le=0.5 * math.pi)] = math.pi / 7.0
-    scatter: NonNegative = 0.0
+    scatter: Noise = 0.0
     scatter_heading: Annotated[float, Meta(ge=0.0, le=math.pi)] = 0.0
 
 

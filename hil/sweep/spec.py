@@ -21,7 +21,7 @@ from hil.scenario.brought import settled_references
 from hil.scenario.checked_toml import checked, locate, read_toml
 from hil.scenario.files import load_scenario, with_overrides
 from hil.scenario.schema import Scenario
-from hil.scenario.section import NonNegative, Positive, Probability
+from hil.scenario.section import Deviation, Probability, Span
 from hil.sweep.refusals import refuse_unsweepable
 
 SHORTEST_S = 1.0
@@ -36,9 +36,9 @@ class Grid(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     ``parameters``: values of each parameter of a law of one's own, if any are to be swept.
     """
 
-    sigma_position: Annotated[tuple[Positive, ...], Meta(min_length=1)]
-    sigma_heading: Annotated[tuple[Positive, ...], Meta(min_length=1)]
-    latency_s: Annotated[tuple[NonNegative, ...], Meta(min_length=1)] = (0.03,)
+    sigma_position: Annotated[tuple[Deviation, ...], Meta(min_length=1)]
+    sigma_heading: Annotated[tuple[Deviation, ...], Meta(min_length=1)]
+    latency_s: Annotated[tuple[Span, ...], Meta(min_length=1)] = (0.03,)
     loss: Annotated[tuple[Probability, ...], Meta(min_length=1)] = (0.0,)
     parameters: dict[str, Annotated[tuple[float, ...], Meta(min_length=1)]] | UnsetType = UNSET
 
@@ -51,7 +51,7 @@ class SweepSpec(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     description: str = ""
     scenario: str = "turtlebot3"
-    runs: Annotated[int, Meta(ge=1)] = 100
+    runs: Annotated[int, Meta(ge=1, le=10**9)] = 100
     seed: Annotated[int, Meta(ge=0, le=2**62)] = 1
     duration_s: Annotated[float, Meta(ge=SHORTEST_S, le=LONGEST_S)] = 30.0
     estimators: Annotated[tuple[str, ...], Meta(min_length=1)] = ("ekf",)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import importlib
 import multiprocessing
+import os
 import sys
+import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import connection
 from typing import Any
 
 import numpy as np
@@ -30,7 +33,7 @@ def fly_here(sweep: Sweep, pieces: Sequence[Piece], workers: int) -> Iterator[Do
         return
     # Spawned processes inherit neither threads nor locks, and numba's code comes out of its cache.
     spawn = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=spawn, initializer=_leave_stdout)
+    pool = ProcessPoolExecutor(workers, mp_context=spawn, initializer=_begin_work)
     try:
         waiting = {pool.submit(fly_piece, sweep, piece): piece for piece in pieces}
         for done in as_completed(waiting):
@@ -43,9 +46,21 @@ def fly_here(sweep: Sweep, pieces: Sequence[Piece], workers: int) -> Iterator[Do
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _leave_stdout() -> None:
-    """Stdout is for results: what laws and estimators of others print in a worker goes to stderr."""
+def _begin_work() -> None:
+    """Leave stdout to results, and end with the sweep, however that ends.
+
+    What laws and estimators of others print in a worker goes to stderr.
+    """
     sys.stdout = sys.stderr
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+
+
+def _end_with(sentinel: int) -> None:
+    """End this process once another has, by its sentinel: one that was killed tells nobody to end."""
+    connection.wait([sentinel])
+    os._exit(1)
 
 
 def fly_on_cluster(sweep: Sweep, pieces: Sequence[Piece], scheduler: str) -> Iterator[Done]:

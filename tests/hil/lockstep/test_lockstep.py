@@ -80,3 +80,18 @@ def test_estimates_are_made_from_frames_that_came_late_and_out_of_order(log: Log
 def test_without_any_frame_the_run_says_what_to_look_at(tmp_path: Path) -> None:
     with pytest.raises(CheckFailedError, match=r"mocap\.loss"):
         run(tmp_path, "blind", "mocap.loss=0.999999999")
+
+
+@pytest.mark.parametrize("ahead_s", [0.002, 0.02, 0.049])
+def test_a_motion_capture_that_is_a_little_ahead_of_the_host_drives_the_robot(
+    ahead_s: float, tmp_path: Path
+) -> None:
+    # Message checks and guard share one tolerance: a frame that is used is one that may move the robot.
+    overrides = {"run.duration_s": 2.0, "mocap.clock_offset_s": ahead_s, "mocap.latency_s": 0.001}
+    run_lockstep(load_scenario("turtlebot3", overrides), tmp_path / "run.mcap")
+    log = read_log(tmp_path / "run.mcap")
+    stops = [decode_as(each.payload, Command).stop for each in log.records(["follower/command"])]
+    driving = [place for place, stop in enumerate(stops) if not stop]
+    first, last = driving[0], driving[-1]
+    assert last - first > 100
+    assert not any(stops[first : last + 1])

@@ -37,7 +37,7 @@ TABLE = "leader.program={kind='table', t=[0.0, 1.0], v=[0.1, 'fast'], u=[0, 0]}"
             'leader.program={kind = "constant", v = -0.1}',
             r"leader\.program\.v is -0\.1: expected float >= 0\.0",
         ),
-        ("formation.rho_0=0", r"formation\.rho_0 is 0: expected float > 0\.0"),
+        ("formation.rho_0=0", r"formation\.rho_0 is 0: expected float >= 0\.001"),
         ("formation.rho_0=nan", r"formation\.rho_0 is nan, expected a finite number"),
         ("leader.pose=[0.0, inf, 0.0]", r"leader\.pose is inf, expected a finite number"),
         ("leader.pose=[0.0, 1.0]", r"leader\.pose is \[0\.0, 1\.0\]: expected array of length 3, got 2"),
