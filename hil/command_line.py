@@ -21,7 +21,7 @@ COMMANDS = {
     "gains": "propose gains for a scenario, with the reason for each",
     "import": "turn other recordings into logs",
     "calibrate": "find the offsets of a range and bearing sensor that mocap has watched",
-    "recover": "make a cut-off log whole",
+    "recover": "make a log whole that was cut off or damaged",
     "doctor": "what is wrong in a lab before anything moves, and what to do about it",
     "status": "daemons, bodies and robots of a lab, live",
     "stop": "stop all robots of a lab",

@@ -1,13 +1,17 @@
-"""``abreast recover``: a cut-off log made whole."""
+"""``abreast recover``: a log that is cut off or damaged made whole."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from hil.errors import CheckFailedError
 from hil.log.report_json import print_json
+
+if TYPE_CHECKING:
+    from hil.log.recovery import Recovery
 
 
 @click.command("recover")
@@ -17,17 +21,12 @@ from hil.log.report_json import print_json
 def command(log: Path, out: Path, as_json: bool) -> None:
     """Copy all that is whole in LOG to a new log that every reader opens.
 
-    Exit code 1 where something is gone in the midst of it.
+    Exit code 0 if nothing is gone, 1 if something is, 2 if nothing of LOG can be read.
     """
     from hil.log.recovery import recover
 
     done = recover(log, out)
-    lost = "nothing is missing" if done.complete else f"cut off; {done.lost_bytes} bytes were of no use"
-    if done.damaged:
-        lost = f"damaged; {done.said()}"
-    if done.last_ns is not None and done.lost_until_ns is not None:
-        lost += f", {max(0, done.lost_until_ns - done.last_ns) * 1e-9:.3f} s or more are lost"
-    click.echo(f"{out}: {done.messages} messages, {done.bytes} bytes; {log} {lost}", err=True)
+    click.echo(f"{out}: {done.messages} messages, {done.bytes} bytes; {log} {_said(done)}", err=True)
     if as_json:
         print_json(
             {
@@ -35,5 +34,20 @@ def command(log: Path, out: Path, as_json: bool) -> None:
                 "gaps": [{"from_s": first, "to_s": last} for first, last in done.gaps_s()],
             }
         )
-    if done.damaged:
+    if not done.complete:
         raise CheckFailedError(f"log {log}: {done.said()}; {out} has what is left")
+
+
+def _said(done: Recovery) -> str:
+    """How the log was, in words."""
+    if done.complete:
+        how = "lacks nothing"
+    elif done.damaged:
+        how = f"is damaged; {done.said()}"
+    else:
+        how = f"is cut off; its last {done.lost_bytes} bytes were of no use"
+    if done.last_ns is not None and done.lost_until_ns is not None:
+        how += f", {max(0, done.lost_until_ns - done.last_ns) * 1e-9:.3f} s or more are lost"
+    if done.restored:
+        how += f"; its metadata {', '.join(done.restored)} were damaged and are what its messages tell"
+    return how

@@ -16,7 +16,7 @@ from hil.commands.guard_option import NO_GUARD
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION, Seconds
 from hil.commands.wire_options import DEFAULT_ENDPOINT, SECURE_ENDPOINT
-from hil.errors import CheckFailedError, InterruptedRunError, UsageError
+from hil.errors import AbreastError, CheckFailedError, InterruptedRunError, UsageError
 from hil.judge.made_by import law_failure
 from hil.live.crew import Crew
 from hil.log.report_json import print_json, results_apart
@@ -188,20 +188,28 @@ def _how(
 
 
 def _run(chosen: Scenario, folder: Path, live: _Live | None, *, as_json: bool) -> None:
-    log_path = folder / "run.mcap"
+    from hil.log.rotating_log import log_place, pieces_of
+
+    named = folder / "run.mcap"
+    log_path = named if live is None else log_place(named, chosen.recorder)
     if log_path.exists():
         raise UsageError(f"{log_path} exists already; give another --out, or move it away")
     failure, left, interrupted, timing = "", "", "", {}
     if live is None:
-        timing = {"lockstep": _lockstep(chosen, log_path)}
+        timing = {"lockstep": _lockstep(chosen, named)}
     else:
-        outcome = _live(chosen, log_path, live)
+        outcome = _live(chosen, named, live)
         failure, left, interrupted = outcome.failure, f"{outcome.robots}, ", _interrupted(outcome)
+        if outcome.recorded and not log_path.exists():
+            gone = f"log {log_path} is not there any more: somebody moved or deleted it during the run"
+            raise CheckFailedError(f"{failure}; {gone}" if failure else gone)
     if not log_path.exists():
         raise CheckFailedError(failure or "interrupted before anything was recorded")
     try:
         if live is not None:
-            _make_whole(log_path)
+            for piece in pieces_of(log_path):
+                # What is in a folder of pieces is taken for one of them by its name.
+                _make_whole(piece, piece.with_suffix(".cut.mcap" if piece == log_path else ".mcap.cut"))
         summary = _judge(log_path, folder)
         if as_json:
             # How long it took is no part of the verdict, which is the same for every run of a seed.
@@ -282,17 +290,22 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> Outcome:
     return outcome
 
 
-def _make_whole(log_path: Path) -> None:
-    """Recover the log if the recorder was cut off; what it left stays beside it as ``run.cut.mcap``."""
+def _make_whole(log_path: Path, cut: Path) -> None:
+    """Recover the log if the recorder was cut off; what it left stays beside it under another name."""
     from hil.log.reader import read_log
     from hil.log.recovery import recover
 
     try:
         read_log(log_path)
     except UsageError:
-        cut = log_path.with_suffix(".cut.mcap")
+        whole = log_path.with_suffix(".whole")
+        try:
+            recover(log_path, whole)
+        except AbreastError as error:
+            click.echo(f"the log was cut off and stays so: {error}", err=True)
+            return
         log_path.rename(cut)
-        recover(cut, log_path)
+        whole.rename(log_path)
         click.echo(
             f"the log was cut off; {log_path} is what could be recovered, {cut} what there was", err=True
         )
@@ -303,9 +316,10 @@ def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
     """Judge the log, leave summary, picture and report beside it, and print the verdict."""
     from hil.judge.summary_text import print_summary
     from hil.log.metadata import scenario_of
+    from hil.log.opened import opened_log
     from hil.log.reader import read_log
 
-    log = read_log(log_path)
+    log = opened_log(log_path) if log_path.is_dir() else read_log(log_path)
     if (own := scenario_of(log)) is not None and chain_of(own) is not None:
         from hil.commands.chain_results import judge_run
 

@@ -16,6 +16,7 @@ from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 from controllers.chain import ChainTrajectory
 from formation.angles import FloatArray
 from hil.extensions.reference import short
+from hil.log.written_aside import written_aside
 from hil.scenario.schema import Scenario
 
 QUIET, LIMIT = "#8a8a8a", "#b03030"
@@ -65,7 +66,8 @@ def save(figure: Figure, path: Path) -> None:
     """Write a picture as PNG, its labels aligned, without the drawing library's version in it."""
     figure.align_ylabels()
     FigureCanvasAgg(figure)
-    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+    with written_aside(path) as aside:
+        figure.savefig(aside, dpi=DPI, metadata={"Software": None})
 
 
 def draw_tracks(axes: Axes, trajectory: ChainTrajectory, colours: list[Colour]) -> None:

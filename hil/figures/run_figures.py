@@ -20,6 +20,7 @@ from hil.figures.robot_drawing import draw_pair
 from hil.figures.run_panels import Panel, panels_for
 from hil.judge.columns import inside
 from hil.judge.made_by import made_by
+from hil.log.written_aside import written_aside
 
 DPI = 96
 _HEIGHT = 8.4
@@ -126,7 +127,9 @@ def _save(figure: Figure, path: Path) -> None:
     figure.savefig(drawn, format="rgba", dpi=DPI)
     size = (round(figure.bbox.width), round(figure.bbox.height))
     picture = Image.frombuffer("RGBA", size, drawn.getvalue()).convert("RGB")
-    picture.quantize(_COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(path, "PNG")
+    small = picture.quantize(_COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    with written_aside(path) as aside:
+        small.save(aside, "PNG")
 
 
 def _title(summary: Mapping[str, Any]) -> str:

@@ -18,6 +18,7 @@ from formation.closed_loop import Trajectory
 from formation.periodic_orbit import PeriodicOrbit
 from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2
 from hil.extensions.reference import is_reference, short
+from hil.log.written_aside import written_aside
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
 
@@ -233,4 +234,5 @@ def _figure(scenario: Scenario, trajectory: Trajectory, width: float, height: fl
 
 def _save(figure: Figure, path: Path) -> None:
     FigureCanvasAgg(figure)
-    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+    with written_aside(path) as aside:
+        figure.savefig(aside, dpi=DPI, metadata={"Software": None})

@@ -15,6 +15,7 @@ from matplotlib.ticker import NullFormatter, ScalarFormatter
 from controllers.attraction import SettlingMap
 from formation.spacing import Spacing
 from hil.judge.stability import PROVED_V1, Gain, Stability
+from hil.log.written_aside import written_aside
 from hil.scenario.parts import gains
 from hil.scenario.schema import Scenario
 
@@ -53,7 +54,8 @@ def draw_stability(scenario: Scenario, found: Stability, path: Path) -> None:
     draw_lyapunov(figure.add_subplot(grid[1, :3]), found)
     draw_gain(figure.add_subplot(grid[1, 3:]), found.gain, spacing, found.margin.lower, found.margin.upper)
     FigureCanvasAgg(figure)
-    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+    with written_aside(path) as aside:
+        figure.savefig(aside, dpi=DPI, metadata={"Software": None})
 
 
 def draw_map(axes: Axes, found: SettlingMap, spacing: Spacing, longest: float) -> QuadMesh:

@@ -26,8 +26,8 @@ class GuardOrder:
     ``wanted``, ``stop``, ``arm``, ``frames``, ``overheard``: keys that it hears; ``cmd_vel``,
     ``diagnostics``: keys that it speaks on. ``drive``: a command to the driver as bytes, in hexadecimal
     digits, with its motion at ``twist_at``; ``stamped`` whether it has a stamp. ``attached``: whether
-    messages carry what rmw_zenoh asks for. ``ros_topic``: the name of the driver's topic in ROS. ``tokens``:
-    what shows the guard in the ROS graph.
+    messages carry what rmw_zenoh asks for. ``ros_topic``: the name of the driver's topic in ROS,
+    ``ros_domain`` its domain, 0 for that of the environment. ``tokens``: what shows the guard in ROS.
     """
 
     robot: str
@@ -44,6 +44,7 @@ class GuardOrder:
     stamped: bool
     attached: bool
     ros_topic: str
+    ros_domain: int
     tokens: tuple[str, ...] = ()
 
     def tokens_of(self, session: str) -> tuple[str, ...]:

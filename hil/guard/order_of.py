@@ -64,6 +64,7 @@ def guard_order(scenario: Scenario, robot: str) -> GuardOrder:
         stamped=stamped,
         attached=layout.kind == "rmw_zenoh",
         ros_topic=layout.name(chosen.cmd_vel),
+        ros_domain=scenario.wire.domain,
         tokens=_tokens(layout, chosen),
     )
 

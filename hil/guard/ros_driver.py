@@ -29,7 +29,9 @@ class RosDriver:
             ) from None
         self._rclpy: Any = rclpy
         self._context: Any = rclpy.Context()
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        domain = order.ros_domain or None
+        no_handlers = SignalHandlerOptions.NO
+        rclpy.init(context=self._context, domain_id=domain, signal_handler_options=no_handlers)
         self._node: Any = rclpy.create_node(f"abreast_guard_{os.getpid()}", context=self._context)
         self._kind: Any = TwistStamped if order.stamped else Twist
         self._stamped, self._frame = order.stamped, order.ros_topic.rpartition("/")[0]

@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import IO
 
 _PATIENCE = 15.0
@@ -16,7 +15,7 @@ _PATIENCE = 15.0
 
 @dataclass(slots=True)
 class Child:
-    """One daemon: its process, a descriptor that becomes readable when it ends, and the file of its words."""
+    """One daemon: its process, a descriptor that becomes readable when it ends, and its words in memory."""
 
     name: str
     process: subprocess.Popen[bytes]
@@ -38,13 +37,13 @@ class Child:
 class Children:
     """The daemons of one run, by name. Each ends by itself when this process goes away."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self) -> None:
         self._children: dict[str, Child] = {}
 
     def start(self, name: str, daemon: str, arguments: list[str]) -> None:
         """Start ``abreast DAEMON ARGUMENTS`` in a process group of its own: Ctrl-C is to reach only us."""
-        words = (self._folder / f".{name}.stderr").open("w+b")
+        # In memory: a disk that is full is what a daemon may have to tell of.
+        words = os.fdopen(os.memfd_create(name), "w+b")
         process = subprocess.Popen(
             [sys.executable, "-m", "hil", daemon, *arguments, "--tethered"],
             stdin=subprocess.PIPE,
@@ -84,5 +83,4 @@ class Children:
             if child.process.stdin is not None:
                 child.process.stdin.close()
             child.words.close()
-            Path(child.words.name).unlink(missing_ok=True)
         self._children.clear()

@@ -7,12 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from hil.live.certificate_process import CertificateProcess
-from hil.log.described_log import DescribedLog
+from hil.live.disk_sync import DiskSync
+from hil.live.disk_watch import FINDING, DiskWatch, refuse_full_disk
 from hil.log.metadata import LIVE, log_metadata
+from hil.log.rotating_log import RotatingLog
+from hil.nodes.findings import named_findings
 from hil.nodes.node import Outgoing, counted, diagnostics, is_due, named_counts, no_counts, outgoing
 from hil.scenario.schema import Scenario
 from hil.wire import topics
-from hil.wire.events import Event
+from hil.wire.events import OVERSIZED, Event
 from hil.wire.message_types import Malformed
 from hil.wire.messages import MalformedPayloadError, decode, encode, header, typename_of
 
@@ -26,7 +29,7 @@ class Recorder:
     """Writes each payload with its time of arrival. A worker of :mod:`hil.live.daemon`.
 
     A payload that is not a valid message of its topic's type would make the log unreadable for others: it
-    goes to the topic ``malformed``, byte for byte.
+    goes to the topic ``malformed``, byte for byte, and so does what stands for one that is too large.
     """
 
     thorough = True
@@ -34,10 +37,15 @@ class Recorder:
     def __init__(self, scenario: Scenario, path: Path) -> None:
         self._types = topics.types_of(scenario)
         self.subscribes = tuple(topic for topic in self._types if topic not in topics.ONLY_IN_LOGS)
-        self._log = DescribedLog(path, log_metadata(scenario, LIVE))
-        self._counts = no_counts()
+        if path.parent.is_dir():
+            refuse_full_disk(path.parent)
+        self._log = RotatingLog(path, log_metadata(scenario, LIVE), scenario.recorder)
+        self._sync = DiskSync()
+        self._watch = self._watched()
+        self._malformed = self._oversized = no_counts()
         self._next_flush_ns = 0
         self._next_report_ns = 0
+        self._scarce = ""
         self._logged_ns = 0
         self._certifying = CertificateProcess(scenario)
 
@@ -60,6 +68,7 @@ class Recorder:
         if not is_due(self._next_report_ns, _DIAGNOSTICS_NS, now_ns):
             return ()
         self._next_report_ns = now_ns + _DIAGNOSTICS_NS
+        self._scarce = self._watch.scarce()
         self._log.add_metadata(self._certifying.result())
         return (self._report(now_ns),)
 
@@ -75,20 +84,43 @@ class Recorder:
     def close(self) -> None:
         """Finish the file; safe to call again."""
         self._certifying.close()
-        self._log.close()
+        try:
+            self._log.close()
+        finally:
+            self._sync.close()
+
+    def _watched(self) -> DiskWatch:
+        """The file that is written now, from now on synced and looked after."""
+        log = self._log.log
+        self._sync.follow(log.path, log.descriptor())
+        return DiskWatch(log.path, log.descriptor())
 
     def _write(self, event: Event, now_ns: int) -> None:
         topic, typename, payload = event.topic, self._types[event.topic], event.payload
         try:
             decode(payload, typename)
         except MalformedPayloadError:
-            self._counts = counted(self._counts, topic)
+            if payload is OVERSIZED:
+                self._oversized = counted(self._oversized, topic)
+            else:
+                self._malformed = counted(self._malformed, topic)
             kept = Malformed(header(now_ns, ""), topic, np.frombuffer(payload, dtype=np.uint8))
             topic, typename, payload = topics.MALFORMED, typename_of(Malformed), encode(kept)
         # In order even if the clock is set back, so that a replay finds it in order.
         self._logged_ns = max(now_ns, self._logged_ns + 1)
         self._log.write(topic, typename, payload, self._logged_ns, now_ns)
+        if self._log.log.path != self._watch.path:
+            self._watch = self._watched()
 
     def _report(self, now_ns: int) -> Outgoing:
-        values = {"messages": self._log.messages, **named_counts("malformed", self._counts)}
-        return outgoing(topics.DIAGNOSTICS, diagnostics(NAME, now_ns, "", values), now_ns)
+        gone, refused = self._watch.gone(), self._sync.failure
+        if refused:
+            refused = f"log {self._watch.path}: the disk does not keep what is written ({refused})"
+        seen = "; ".join(filter(None, (gone, refused, self._scarce)))
+        values = {
+            "messages": self._log.messages,
+            **named_counts("malformed", self._malformed),
+            **named_counts("oversized", self._oversized),
+            **named_findings({FINDING: seen} if seen else {}),
+        }
+        return outgoing(topics.DIAGNOSTICS, diagnostics(NAME, now_ns, gone or refused, values), now_ns)

@@ -17,7 +17,9 @@ from hil.guard.report import GUARDS
 from hil.live.child_processes import Children
 from hil.live.crew import Crew, processes_of
 from hil.live.daemon import Ending
+from hil.live.disk_watch import refuse_full_disk
 from hil.live.run_monitor import RunMonitor, Snapshot
+from hil.log.written_aside import write_text_aside
 from hil.nodes.findings import named_findings
 from hil.nodes.link_nodes import leader_standstill, standstill
 from hil.nodes.node import diagnostics
@@ -53,7 +55,8 @@ Show = Callable[[Snapshot, float | None], None]
 class Outcome:
     """How a live run ended: what failed (empty: nothing), whether it was interrupted, how long it drove.
 
-    ``robots``: in words, what was seen of how the robots were left. ``signal``: what interrupted it.
+    ``robots``: in words, what was seen of how the robots were left. ``recorded``: the recorder was heard, so
+    that there was a log. ``signal``: what interrupted it.
     """
 
     failure: str
@@ -61,6 +64,7 @@ class Outcome:
     duration_s: float
     robots: str
     signal: int = 0
+    recorded: bool = False
 
 
 def run_live(
@@ -74,9 +78,10 @@ def run_live(
     second. However it ends, the robots are stopped, the log is finished and no process is left.
     """
     folder = log_path.parent
+    refuse_full_disk(folder)
     resolved = folder / "scenario.toml"
     try:
-        resolved.write_text(scenario_text(scenario), encoding="utf-8")
+        write_text_aside(resolved, scenario_text(scenario))
     except OSError as error:
         raise UsageError(
             f"--out {folder}: cannot be written ({error.strerror}); give another folder"
@@ -117,7 +122,7 @@ class _Supervisor:
         watched = self._robots[0 if crew.drives_leader else 1 :] if crew.real else ()
         self._wheels = {each.odom: each.name for each in watched}
         self._monitor = RunMonitor(self._session, pairs, layout_of(scenario), tuple(self._wheels))
-        self._children = Children(log_path.parent)
+        self._children = Children()
         self._drivers: list[str] = []
         for name, daemon, followers in processes_of(self._links, crew.daemons):
             arguments = [str(resolved), *joining.options, *crew.options(daemon, log_path, names)]
@@ -157,7 +162,8 @@ class _Supervisor:
             unseen = f"{', '.join(moving)} {'have' if len(moving) > 1 else 'has'} not been seen to stand"
             unseen += f" within {STANDSTILL_TIMEOUT:g} s; use {'their' if len(moving) > 1 else 'its'} switch"
             failure = f"{failure}; {unseen}" if failure else unseen
-        return Outcome(failure, ending.asked, driven, self._how_left(), ending.signal)
+        recorded = "recorder" in self._monitor.snapshot.heard
+        return Outcome(failure, ending.asked, driven, self._how_left(), ending.signal, recorded)
 
     def close(self) -> None:
         """Who drives robots first, its last word being a standstill; recorder last, to miss nothing."""

@@ -21,14 +21,19 @@ class DescribedLog(LogWriter):
     """A :class:`LogWriter` that puts a description on the topic :data:`hil.wire.topics.LOG`.
 
     It stands in front of the first message, of the first one after metadata were added, and every five
-    seconds of log time.
+    seconds of log time. ``begun_ns``: when a log began of which this is a later piece; else it becomes the
+    time of the first message.
     """
 
     def __init__(
-        self, path: Path, metadata: Mapping[str, Mapping[str, str]], flush_every_s: float = 0.2
+        self,
+        path: Path,
+        metadata: Mapping[str, Mapping[str, str]],
+        flush_every_s: float = 0.2,
+        begun_ns: int | None = None,
     ) -> None:
         self._told: dict[str, Mapping[str, str]] = {}
-        self._begun_ns: int | None = None
+        self.begun_ns = begun_ns
         self._next_ns = 0
         super().__init__(path, metadata, flush_every_s)
 
@@ -46,7 +51,7 @@ class DescribedLog(LogWriter):
             self._next_ns = 0
 
     def _describe(self, log_ns: int, publish_ns: int) -> None:
-        if self._begun_ns is None:
-            self._begun_ns = log_ns
+        if self.begun_ns is None:
+            self.begun_ns = log_ns
         self._next_ns = log_ns + PERIOD_NS
-        super().write(topics.LOG, _STRING, description(self._told, self._begun_ns), log_ns, publish_ns)
+        super().write(topics.LOG, _STRING, description(self._told, self.begun_ns), log_ns, publish_ns)

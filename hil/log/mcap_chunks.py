@@ -54,6 +54,7 @@ class ChunkedMcap:
     def __init__(self, emit: Callable[[bytes], None], profile: str, library: str) -> None:
         self._emit_bytes = emit
         self._offset = 0
+        self._declarations = bytearray()
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
         self._metadata_indexes: list[MetadataIndex] = []
@@ -79,7 +80,7 @@ class ChunkedMcap:
         """Declare a message type; returns its id."""
         schema = Schema(id=len(self._schemas) + 1, name=name, encoding=encoding, data=data)
         self._schemas.append(schema)
-        self._put(_bytes_of([schema]))
+        self._declare(schema)
         return schema.id
 
     def add_channel(self, topic: str, schema_id: int, encoding: str, metadata: Mapping[str, str]) -> int:
@@ -94,8 +95,12 @@ class ChunkedMcap:
         self._channels.append(channel)
         self._message_counts[channel.id] = 0
         self._entries[channel.id] = []
-        self._put(_bytes_of([channel]))
+        self._declare(channel)
         return channel.id
+
+    def repeat_declarations(self) -> None:
+        """Put all types and topics into the open chunk again: where an earlier one is lost they are known."""
+        self._put(bytes(self._declarations))
 
     def add_message(self, channel_id: int, log_ns: int, publish_ns: int, payload: bytes) -> int:
         """Put a message into the open chunk, with the channel's next sequence number (from 0).
@@ -163,8 +168,9 @@ class ChunkedMcap:
     def finish(self) -> None:
         """Write what is still in memory, the summary and the end of the file."""
         self.close_chunk()
-        self._emit(_bytes_of([DataEnd(data_section_crc=0)]))
-        summary_start = self._offset
+        # With the summary, at once: where that does not fit the data go on to their end all the same.
+        data_end = _bytes_of([DataEnd(data_section_crc=0)])
+        summary_start = self._offset + len(data_end)
         groups: list[tuple[Opcode, bytes]] = [
             (Opcode.SCHEMA, _bytes_of(self._schemas)),
             (Opcode.CHANNEL, _bytes_of(self._channels)),
@@ -184,7 +190,18 @@ class ChunkedMcap:
         footer_head = _FOOTER_HEAD.pack(Opcode.FOOTER, _FOOTER_BYTES, summary_start, offsets_start)
         crc = zlib.crc32(footer_head, zlib.crc32(summary))
         footer = Footer(summary_start=summary_start, summary_offset_start=offsets_start, summary_crc=crc)
-        self._emit(summary + _bytes_of([footer]) + MAGIC)
+        self._emit(data_end + summary + _bytes_of([footer]) + MAGIC)
+
+    @staticmethod
+    def bare_end() -> bytes:
+        """The end of a file that has no room for a summary: whoever reads it looks at all of its records."""
+        footer = Footer(summary_start=0, summary_offset_start=0, summary_crc=0)
+        return _bytes_of([DataEnd(data_section_crc=0), footer]) + MAGIC
+
+    def _declare(self, record: Schema | Channel) -> None:
+        data = _bytes_of([record])
+        self._declarations += data
+        self._put(data)
 
     def _put(self, record: bytes) -> None:
         self._pieces.append(record)

@@ -15,8 +15,8 @@ from typing import BinaryIO, NamedTuple
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Chunk
-from mcap.stream_reader import get_chunk_data_stream
 
+from hil.log.chunk_unpacking import chunk_records, packed_records
 from hil.log.mcap_summary import ChunkPlace
 
 _RECORD = struct.Struct("<BQ")
@@ -55,23 +55,14 @@ def entries_in_order(
 def chunk_data(stream: BinaryIO, offset: int) -> bytes:
     """Records of the chunk at an offset of a file; raises as :func:`entries_in_order`."""
     stream.seek(offset + _RECORD.size)
-    chunk = Chunk.read(ReadDataStream(stream))
-    uncompressed, size = get_chunk_data_stream(chunk, validate_crc=True)
-    data: bytes = uncompressed.read(size)
-    return data
+    return chunk_records(Chunk.read(ReadDataStream(stream)))
 
 
 def _entries(stream: BinaryIO, offset: int, wanted: Callable[[int, int], bool]) -> Iterator[Entry]:
     data = chunk_data(stream, offset)
-    at, size = 0, len(data)
-    while at < size:
-        opcode, length = _RECORD.unpack_from(data, at)
-        at += _RECORD.size
-        if at + length > size:
-            raise ValueError("a record is longer than the chunk that it is in")
+    for opcode, at, end in packed_records(data):
         if opcode == Opcode.MESSAGE:
             channel_id, sequence, log_ns, publish_ns = _MESSAGE.unpack_from(data, at)
             if wanted(channel_id, log_ns):
-                payload = data[at + _MESSAGE.size : at + length]
+                payload = data[at + _MESSAGE.size : end]
                 yield Entry(log_ns, offset, at, channel_id, sequence, publish_ns, payload)
-        at += length

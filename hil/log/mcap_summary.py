@@ -28,6 +28,23 @@ _CHUNK = struct.Struct("<QQQQI")
 _CHANNEL_OFFSET = np.dtype([("channel", "<u2"), ("offset", "<u8")])
 
 
+class WholeFields(ReadDataStream):
+    """The body of a record, each field of which has the length that it says; ValueError where one has not.
+
+    The ``mcap`` package hands out what there is of a field.
+    """
+
+    def __init__(self, body: bytes) -> None:
+        super().__init__(io.BytesIO(body))
+
+    def read(self, length: int) -> bytes:
+        """The next bytes of the body."""
+        data: bytes = super().read(length)
+        if len(data) < length:
+            raise ValueError("a field is longer than the record that it is in")
+        return data
+
+
 class ChunkPlace(NamedTuple):
     """Where a chunk is, and the log times of its first and last message; ``offsets``: a map by channel.
 
@@ -59,13 +76,17 @@ class ChunkPlace(NamedTuple):
 
 @dataclass(slots=True)
 class McapSummary:
-    """What a summary tells; ``chunks`` in the order of their first messages."""
+    """What a summary tells; ``chunks`` in the order of their first messages.
+
+    ``summed``: whether its sum was there, and right.
+    """
 
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     statistics: Statistics | None = None
     metadata: list[MetadataIndex] = field(default_factory=list)
     chunks: list[ChunkPlace] = field(default_factory=list)
+    summed: bool = False
 
 
 def read_summary(stream: BinaryIO) -> McapSummary | None:
@@ -86,7 +107,9 @@ def read_summary(stream: BinaryIO) -> McapSummary | None:
     data = stream.read(end - start)
     if expected and zlib.crc32(footer[:-_CRC_BYTES], zlib.crc32(data)) != expected:
         raise ValueError("the sum of the summary is wrong")
-    return _summary_of(data)
+    summary = _summary_of(data)
+    summary.summed = bool(expected)
+    return summary
 
 
 def _summary_of(data: bytes) -> McapSummary:
@@ -127,5 +150,7 @@ def read_metadata(stream: BinaryIO, index: MetadataIndex) -> Metadata:
     opcode, length = _RECORD.unpack(stream.read(_RECORD.size))
     if opcode != Opcode.METADATA:
         raise ValueError(f"a record of kind {opcode} stands where metadata should")
-    found: Metadata = Metadata.read(ReadDataStream(io.BytesIO(stream.read(length))))
+    found: Metadata = Metadata.read(WholeFields(stream.read(length)))
+    if found.name != index.name:
+        raise ValueError(f"metadata {found.name!r} stand where {index.name!r} should")
     return found

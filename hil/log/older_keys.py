@@ -18,6 +18,8 @@ BEFORE: dict[str, Any] = {
     "source.scale": 1.0,
     "source.pair_within_s": 0.002,
     "source.emulated": "",
+    "recorder.rotate_mb": 0.0,
+    "recorder.rotate_s": 0.0,
     "wire.layout": "ros2dds",
     "wire.prefix": "",
     "wire.domain": 0,

@@ -14,15 +14,15 @@ from typing import BinaryIO
 from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader
 from mcap.records import Channel, Schema
-from mcap.records import Message as McapMessage
-from mcap.stream_reader import StreamReader
 from zstandard import ZstdError
 
 from hil.errors import UsageError
+from hil.log import metadata_sums
 from hil.log.description import SETTLED_NS, described
 from hil.log.mcap_chunks import MAGIC
 from hil.log.mcap_order import entries_in_order
-from hil.log.mcap_summary import ChunkPlace, read_metadata, read_summary
+from hil.log.mcap_scan import scanned_summary
+from hil.log.mcap_summary import ChunkPlace, McapSummary, read_metadata, read_summary
 from hil.wire.message_types import Message
 from hil.wire.messages import decode, typestore_of
 from hil.wire.topics import LOG
@@ -176,50 +176,66 @@ def _indexed(
 def read_log(path: Path) -> Log:
     """Open a log: check that it is whole, and read all but its messages.
 
-    Raises :class:`UsageError` if it is missing, a folder, not MCAP, cut off or damaged.
+    Raises :class:`UsageError` if it is missing, a folder, not MCAP, cut off or damaged, and if its metadata,
+    the scenario among them, are not what was written.
     """
     check_mcap(path)
     with reading(path) as stream:
         _refuse_cut_off(stream, path)
         summary = read_summary(stream)
-        indexed = bool(summary and summary.statistics and summary.channels and summary.schemas)
-        if summary is not None and summary.statistics is not None and indexed:
-            schemas, channels = summary.schemas, summary.channels
-            counts = summary.statistics.channel_message_counts
-            messages = summary.statistics.message_count
-            start_ns, end_ns = summary.statistics.message_start_time, summary.statistics.message_end_time
-        else:
-            schemas, channels, messages, start_ns, end_ns = _scan(stream)
-            counts = {}
-        if summary is not None:
-            if not all(chunk.is_there(stream) for chunk in summary.chunks):
-                raise damaged(path, "chunks are not where its summary has them")
-            records = [read_metadata(stream, index) for index in summary.metadata]
-        else:
-            stream.seek(0)
-            records = list(NonSeekingReader(stream).iter_metadata())
-        metadata = {record.name: dict(record.metadata) for record in records}
-        ordered = [channels[number] for number in sorted(channels)]
-        log = Log(
-            path=path,
-            metadata=metadata,
-            topics={channel.topic: _typename(schemas.get(channel.schema_id)) for channel in ordered},
-            encodings={channel.topic: channel.message_encoding for channel in ordered},
-            definitions={
-                _typename(schema): schema.data.decode()
-                for schema in schemas.values()
-                if schema.encoding == "ros2msg" and schema.data
-            },
-            messages=messages,
-            start_ns=start_ns if messages else None,
-            end_ns=end_ns if messages else None,
-            channels={
-                channel.id: (channel.topic, _typename(schemas.get(channel.schema_id))) for channel in ordered
-            },
-            chunks=tuple(summary.chunks) if summary is not None and indexed else (),
-            counts=_by_topic(counts, channels),
-        )
+        if summary is None or not (summary.statistics and summary.channels and summary.schemas):
+            summary = scanned_summary(stream)
+        if not all(chunk.is_there(stream) for chunk in summary.chunks):
+            raise damaged(path, "chunks are not where its summary has them")
+        metadata = _metadata_of(stream, path, summary)
+        log = _log_of(path, summary, metadata)
     return replace(log, metadata={**told_in_messages(log), **metadata})
+
+
+def _log_of(path: Path, summary: McapSummary, metadata: Mapping[str, Mapping[str, str]]) -> Log:
+    schemas, statistics = summary.schemas, summary.statistics
+    ordered = [summary.channels[number] for number in sorted(summary.channels)]
+    messages = statistics.message_count if statistics else 0
+    return Log(
+        path=path,
+        metadata=metadata,
+        topics={channel.topic: _typename(schemas.get(channel.schema_id)) for channel in ordered},
+        encodings={channel.topic: channel.message_encoding for channel in ordered},
+        definitions={
+            _typename(schema): schema.data.decode()
+            for schema in schemas.values()
+            if schema.encoding == "ros2msg" and schema.data
+        },
+        messages=messages,
+        start_ns=statistics.message_start_time if statistics and messages else None,
+        end_ns=statistics.message_end_time if statistics and messages else None,
+        channels={
+            channel.id: (channel.topic, _typename(schemas.get(channel.schema_id))) for channel in ordered
+        },
+        chunks=tuple(summary.chunks),
+        counts=_by_topic(statistics.channel_message_counts if statistics else {}, summary.channels),
+    )
+
+
+def _metadata_of(stream: BinaryIO, path: Path, summary: McapSummary) -> dict[str, dict[str, str]]:
+    """Metadata records by name, without their sums, which they are held to."""
+    records: dict[str, dict[str, str]] = {}
+    try:
+        for index in summary.metadata:
+            records[index.name] = dict(read_metadata(stream, index).metadata)
+    except DAMAGE:
+        raise _other_metadata(path, index.name) from None
+    sums = records.pop(metadata_sums.RECORD, {})
+    if changed := metadata_sums.changed(records, sums):
+        raise _other_metadata(path, ", ".join(changed))
+    return records
+
+
+def _other_metadata(path: Path, names: str) -> UsageError:
+    return UsageError(
+        f"log {path}: its metadata {names} (scenario, seed, certificate) are not what was written, by their "
+        f"SHA-256; have them put right, where the log tells them again, by: abreast recover {path} --out LOG"
+    )
 
 
 def told_in_messages(log: Log) -> dict[str, dict[str, str]]:
@@ -242,7 +258,10 @@ def _by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> dic
 
 
 def check_mcap(path: Path) -> None:
-    """Raise :class:`UsageError` unless the path is a file that begins as MCAP does."""
+    """Raise :class:`UsageError` unless the path is a file that begins as MCAP does.
+
+    It is a :class:`DamagedLogError` where the beginning alone speaks against it.
+    """
     if path.is_dir():
         raise UsageError(f"log {path}: is a folder; expected an MCAP file")
     try:
@@ -255,7 +274,7 @@ def check_mcap(path: Path) -> None:
     if not start:
         raise UsageError(f"log {path}: is empty; expected an MCAP file")
     if start != MAGIC:
-        raise UsageError(
+        raise DamagedLogError(
             f"log {path}: is not MCAP (it begins with {start!r}); expected a log or a rosbag2 MCAP"
         )
 
@@ -287,23 +306,6 @@ def _refuse_cut_off(stream: BinaryIO, path: Path) -> None:
     if size < _SHORTEST_BYTES or stream.read() != MAGIC:
         raise UsageError(f"log {path}: is cut off; make it whole with: abreast recover {path} --out LOG")
     stream.seek(0)
-
-
-def _scan(stream: BinaryIO) -> tuple[dict[int, Schema], dict[int, Channel], int, int, int]:
-    """Return schemas, channels, message count and first and last log time of a log without a summary."""
-    stream.seek(0)
-    schemas: dict[int, Schema] = {}
-    channels: dict[int, Channel] = {}
-    messages, first, last = 0, 2**64, 0
-    for record in StreamReader(stream).records:
-        if isinstance(record, Schema):
-            schemas[record.id] = record
-        elif isinstance(record, Channel):
-            channels[record.id] = record
-        elif isinstance(record, McapMessage):
-            messages += 1
-            first, last = min(first, record.log_time), max(last, record.log_time)
-    return schemas, channels, messages, first, last
 
 
 def _typename(schema: Schema | None) -> str:

@@ -14,6 +14,8 @@ from typing import Any, TextIO
 import click
 import numpy as np
 
+from hil.log.written_aside import write_text_aside
+
 
 def known(value: Any) -> Any:
     """Value with plain Python types, and without entries that are None or not finite, or empty for that."""
@@ -69,5 +71,5 @@ def print_text(text: str) -> None:
 
 
 def write_json(result: Mapping[str, Any], path: Path) -> None:
-    """Write a result to a file, indented."""
-    path.write_text(as_json(result, indent=2) + "\n", encoding="utf-8")
+    """Write a result to a file, indented; it is whole or not there."""
+    write_text_aside(path, as_json(result, indent=2) + "\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,7 +22,8 @@ from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typest
 from rosbags.typesys.store import Typestore
 
 from hil.errors import UsageError
-from hil.log.reader import Log, Record, damaged
+from hil.log.chunk_unpacking import LARGEST_CHUNK_BYTES
+from hil.log.reader import DAMAGE, Log, Record
 from hil.wire.messages import known_types
 
 _Convert = Callable[[bytes], bytes]
@@ -119,11 +121,13 @@ def _reading(path: Path, opened: Callable[[], Any]) -> Iterator[Any]:
         raise UsageError(f"log {path}: no such file; check the path") from None
     except OSError as error:
         raise UsageError(f"log {path}: cannot be read ({error.strerror or error})") from None
-    except (Ros1Error, Ros2Error, zstandard.ZstdError) as error:
-        raise damaged(path, " ".join(str(error).split())) from None
     except TypesysError as error:
         reason = " ".join(str(error).split())
         raise UsageError(f"log {path}: its message definitions can't be used ({reason})") from None
+    except (Ros1Error, Ros2Error, SerdeError, sqlite3.Error, AssertionError, IndexError, *DAMAGE) as error:
+        # What the bytes make of it on the way is no matter: they are not those of a bag.
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise UsageError(f"log {path}: is damaged, or no bag ({reason}); check the file") from None
 
 
 def _translated(connections: Collection[Connection]) -> list[_Topic]:
@@ -163,7 +167,10 @@ def _converter(
 
 
 def _unzipped(payload: bytes) -> bytes:
-    return zstandard.decompress(payload)
+    told = zstandard.get_frame_parameters(payload).content_size
+    if LARGEST_CHUNK_BYTES < told != zstandard.CONTENTSIZE_UNKNOWN:
+        raise zstandard.ZstdError(f"a message of {len(payload)} bytes claims to hold {told}")
+    return zstandard.ZstdDecompressor().decompress(payload, max_output_size=LARGEST_CHUNK_BYTES)
 
 
 def _text(connection: Connection) -> str:

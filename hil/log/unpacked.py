@@ -17,7 +17,9 @@ from hil.errors import UsageError
 from hil.log.reader import DamagedLogError, Log, Record, damaged, read_log
 from hil.log.recovery import recover
 
-_PIECE_BYTES = 1 << 20
+_PIECE_BYTES = 1 << 12
+_UNSUSPICIOUS_BYTES = 64 << 20
+_HIGHEST_RATIO = 1000
 
 
 class Copy:
@@ -58,10 +60,8 @@ def salvaged(path: Path) -> Log:
     """
     copy = Copy(path.name)
     done = recover(path, copy.file)
-    if not done.messages:
-        raise damaged(path, "no message of it can be read")
     log = in_place_of(path, read_log(copy.file), copy)
-    return replace(log, damage=f"the log is damaged: {done.said()}")
+    return log if done.complete else replace(log, damage=f"the log is damaged: {done.said()}")
 
 
 def whole_or_salvaged(path: Path) -> Log:
@@ -73,13 +73,21 @@ def whole_or_salvaged(path: Path) -> Log:
 
 
 def _unpack(packed: BinaryIO, target: BinaryIO) -> bool:
-    """Unpack a file of frames; whether the last of them is whole."""
+    """Unpack a file of frames; whether the last of them is whole.
+
+    Raises :class:`zstandard.ZstdError` for one that becomes larger than any log does.
+    """
     frame = zstandard.ZstdDecompressor().decompressobj()
+    taken = given = 0
+    # In small pieces, as each is unpacked at once.
     while piece := packed.read(_PIECE_BYTES):
+        taken += len(piece)
         while piece:
             if frame.eof:
                 frame = zstandard.ZstdDecompressor().decompressobj()
-            target.write(frame.decompress(piece))
+            given += target.write(frame.decompress(piece))
+            if given > _UNSUSPICIOUS_BYTES + _HIGHEST_RATIO * taken:
+                raise zstandard.ZstdError(f"its first {taken} bytes become {given} and more, as no log's do")
             piece = frame.unused_data
     return frame.eof
 

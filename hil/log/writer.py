@@ -9,6 +9,8 @@ from typing import Self
 
 from hil import __version__
 from hil.errors import AbreastError, UsageError
+from hil.log import metadata_sums
+from hil.log.disk import disk_of
 from hil.log.mcap_chunks import ChunkedMcap
 from hil.wire.messages import definition, rihs01
 
@@ -26,18 +28,30 @@ class LogWriter:
     before the first message that far off from any of it is taken. As no clock is looked at, a writer whose
     messages cease for a while should call :meth:`flush`. Not for use from several threads.
 
+    Types and topics are told again every ``repeat_every_s`` of log time (0: never), so that what is damaged
+    in front does not take with it what follows. Metadata are followed by their sums.
+
     Raises :class:`UsageError` if the file exists or can't be created, and :class:`AbreastError` from any
-    method once the disk refuses to take more; what was written before stays recoverable.
+    method once the disk refuses to take more; the file then ends behind what was written before, without a
+    summary. ``messages``, ``bytes``: how many were taken, and the size of the file.
     """
 
     def __init__(
-        self, path: Path, metadata: Mapping[str, Mapping[str, str]], flush_every_s: float = 0.2
+        self,
+        path: Path,
+        metadata: Mapping[str, Mapping[str, str]],
+        flush_every_s: float = 0.2,
+        repeat_every_s: float = 1.0,
     ) -> None:
         self.path = path
         self.messages = 0
+        self.bytes = 0
         self._flush_every_ns = round(flush_every_s * 1e9)
         # Earliest log time in the open chunk, and the one that it does not reach; equal while it is empty.
         self._first_ns = self._until_ns = 0
+        self._repeat_every_ns = round(repeat_every_s * 1e9)
+        self._told_ns: int | None = None
+        self._sums: dict[str, str] = {}
         self._schema_ids: dict[str, int] = {}
         self._channel_ids: dict[tuple[str, str], int] = {}
         self._failed = False
@@ -68,9 +82,17 @@ class LogWriter:
             self.flush()
 
     def add_metadata(self, metadata: Mapping[str, Mapping[str, str]]) -> None:
-        """Write more metadata records, at once."""
+        """Write more metadata records, at once, and the sums of all of them."""
+        if not metadata:
+            return
         for name, entries in metadata.items():
             self._mcap.add_metadata(name, entries)
+        self._sums |= metadata_sums.sums_of(metadata)
+        self._mcap.add_metadata(metadata_sums.RECORD, self._sums)
+
+    def descriptor(self) -> int:
+        """Descriptor of the file, for as long as it is open."""
+        return self._file.fileno()
 
     def flush(self) -> None:
         """Hand everything written so far to the operating system: it then survives a kill of the process."""
@@ -104,8 +126,18 @@ class LogWriter:
         if max(last_ns, log_ns) - min(first_ns, log_ns) >= self._flush_every_ns:
             self.flush()
             first_ns = log_ns
+        if self._first_ns == self._until_ns:
+            self._tell_again(log_ns)
         self._first_ns = min(first_ns, log_ns)
         self._until_ns = self._first_ns + self._flush_every_ns
+
+    def _tell_again(self, log_ns: int) -> None:
+        """Begin a chunk with all types and topics where that is due."""
+        if self._told_ns is None:
+            self._told_ns = log_ns
+        elif 0 < self._repeat_every_ns <= abs(log_ns - self._told_ns):
+            self._mcap.repeat_declarations()
+            self._told_ns = log_ns
 
     def _declare(self, topic: str, typename: str) -> int:
         if typename not in self._schema_ids:
@@ -121,12 +153,28 @@ class LogWriter:
         if self._failed:
             raise AbreastError(f"log {self.path}: given up after an earlier write error")
         try:
-            rest = memoryview(data)
-            while rest:
-                rest = rest[self._file.write(rest) :]
+            self._put(data)
         except OSError as error:
             self._failed = True
-            reason = error.strerror or str(error)
+            reason, disk = error.strerror or str(error), disk_of(self.path)
+            whole = self._end_early()
+            kept = "it is whole up to there" if whole else "abreast recover keeps what is whole"
             raise AbreastError(
-                f"log {self.path}: writing failed ({reason}); what came before is there for: abreast recover"
+                f"log {self.path}: writing failed ({reason}) on {disk}; {kept}, make room there"
             ) from error
+        self.bytes += len(data)
+
+    def _put(self, data: bytes) -> None:
+        rest = memoryview(data)
+        while rest:
+            rest = rest[self._file.write(rest) :]
+
+    def _end_early(self) -> bool:
+        """End the file behind the last records that are whole; whether the disk has room for that."""
+        try:
+            self._file.truncate(self.bytes)
+            self._file.seek(self.bytes)
+            self._put(ChunkedMcap.bare_end())
+        except OSError:
+            return False
+        return True

@@ -38,7 +38,7 @@ ADVICE = {
     "deaf_robot": "see that the robot listens to the topic and the type of its commands",
     "command_type": "set controller.command_type to what the robot listens to",
     "log_damaged": "abreast recover keeps what is whole",
-    "disk": "make room where the log is written",
+    "disk": "make room where the log is written, and leave its folder where it is",
     "stopped_by": "ask whoever sent the stop; start the controller again to go on",
 }
 """What to do, by the name of what was found."""

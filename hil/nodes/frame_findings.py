@@ -15,7 +15,7 @@ from typing import NamedTuple
 from hil.nodes.findings import Findings
 from hil.nodes.frame_looks import Look, quoted
 from hil.scenario.schema import Scenario
-from hil.wire.message_checks import has_orientation
+from hil.wire.message_checks import FASTEST, has_orientation
 from hil.wire.records import Placement
 
 _NS = 1e-9
@@ -26,7 +26,7 @@ _AXES = "xyz"
 _TILTED, _UPRIGHT = math.cos(math.radians(30.0)), 0.99
 _ROSE, _KEPT = 0.2, 0.2  # [m] that no robot on the ground goes up and down; share of it that is a height
 _ALIKE = 0.3  # share of its way along the ground that a height does not vary by
-_FARTHEST, _HIGHEST, _FASTEST = 30.0, 10.0, 20.0  # [m], [m], [m/s] that are none of robots in one room
+_FARTHEST, _HIGHEST = 30.0, 10.0  # [m] that are none of robots in one room
 _AHEAD_S = 0.05
 _STANDS_NS = 400_000_000
 
@@ -101,7 +101,7 @@ def unit_text(looks: Sequence[Look]) -> str:
         min(abs(coordinate) for coordinate in (place.z, place.y)) for pair in pairs for place in pair
     )
     fast = _speed(looks)
-    if not (apart > _FARTHEST or high > _HIGHEST or fast > _FASTEST):
+    if not (apart > _FARTHEST or high > _HIGHEST or fast > FASTEST):
         return ""
     moves = f" and move at {fast:.3g} m/s" if fast > 1.0 else ""
     return (

@@ -12,6 +12,7 @@ import numpy as np
 from estimation.tracking.estimate import QUANTITIES
 from estimation.tracking.tracker import Status
 from hil.errors import UsageError
+from hil.log.written_aside import written_aside
 from hil.replay.kept import Array
 from hil.replay.kept_rows import EstimateRow, estimate_row
 from hil.wire.estimate_layout import read_estimate
@@ -43,7 +44,7 @@ def write_estimates(estimates: Iterable[LeaderEstimate] | Array, path: Path) -> 
     else:
         rows = map(_row_of, estimates)
     try:
-        with path.open("w", encoding="utf-8", newline="") as stream:
+        with written_aside(path) as aside, aside.open("w", encoding="utf-8", newline="") as stream:
             writer = csv.writer(stream, lineterminator="\n")
             writer.writerow(FIELDS)
             writer.writerows(map(_cells, rows))

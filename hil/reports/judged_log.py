@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from hil.errors import UsageError
 from hil.log.report_json import write_json
+from hil.log.written_aside import write_text_aside
 
 if TYPE_CHECKING:
     from hil.judge.run_data import RunData
@@ -61,4 +62,4 @@ def leave(run_data: RunData, summary: Mapping[str, Any], folder: Path, picture: 
     write_json(summary, folder / "summary.json")
     data = PlotData.of(run_data)
     draw_run(data, summary, folder / picture)
-    (folder / "report.html").write_text(run_report(data, summary), encoding="utf-8")
+    write_text_aside(folder / "report.html", run_report(data, summary))

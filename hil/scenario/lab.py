@@ -1,4 +1,4 @@
-"""Sections of a scenario on what a lab has at both ends: motion capture, topics on the wire, guards."""
+"""Sections of a scenario on a lab: motion capture, topics on the wire, guards, the log on the disk."""
 
 from __future__ import annotations
 
@@ -38,6 +38,21 @@ class SourceSection(Section, frozen=True, kw_only=True):
     scale: Positive = 1.0
     pair_within_s: NonNegative = 0.002
     emulated: Literal["", "leader", "follower"] = ""
+
+
+class RecorderSection(Section, frozen=True, kw_only=True):
+    """How the recorder of a live run keeps its log.
+
+    ``rotate_mb``, ``rotate_s``: begin a new file once one has this size or covers this time; 0 for never.
+    """
+
+    rotate_mb: NonNegative = 0.0
+    rotate_s: NonNegative = 0.0
+
+    @property
+    def rotates(self) -> bool:
+        """Whether the log comes in pieces."""
+        return self.rotate_mb > 0.0 or self.rotate_s > 0.0
 
 
 class WireSection(Section, frozen=True, kw_only=True):

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, get_args
 from msgspec import UNSET, Meta, UnsetType
 
 from hil.scenario.emulated import MocapSection, RobotSection
-from hil.scenario.lab import GuardSection, SourceSection, WireSection
+from hil.scenario.lab import GuardSection, RecorderSection, SourceSection, WireSection
 from hil.scenario.section import (
     BodyName,
     MountTriple,
@@ -300,5 +300,6 @@ class Scenario(Section, frozen=True, kw_only=True):
     source: SourceSection = SourceSection()
     wire: WireSection = WireSection()
     guard: GuardSection = GuardSection()
+    recorder: RecorderSection = RecorderSection()
     chain: ChainSection | UnsetType = UNSET
     flock: FlockSection | UnsetType = UNSET

@@ -16,6 +16,7 @@ from hil.extensions.reference import is_reference
 from hil.figures.simulation_figures import draw_experiment, draw_simulation
 from hil.figures.stability_figures import draw_stability
 from hil.judge.stability import PROVED_V1, Stability, stability_json, stability_of
+from hil.log.written_aside import written_aside
 from hil.scenario import parts as scenario_parts
 from hil.scenario.noise_free_runs import follower_law, noise_free_run
 from hil.scenario.ordered_sides import refusal
@@ -139,7 +140,7 @@ def _write_csv(trajectory: Trajectory, path: Path) -> None:
     header = [*_COLUMNS, *(f"leader_{c}" for c in _POSE_COLUMNS), *(f"follower_{c}" for c in _POSE_COLUMNS)]
     columns = [getattr(trajectory, name) for name in _COLUMNS]
     table = np.column_stack([*columns, trajectory.leader, trajectory.follower])
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with written_aside(path) as aside, aside.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows(table.tolist())

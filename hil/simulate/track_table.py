@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation.angles import FloatArray
+from hil.log.written_aside import written_aside
 
 MOST_WRITTEN = 2_000_000
 """Numbers that a file may hold: longer runs of more agents are written more coarsely."""
@@ -34,7 +35,7 @@ def write_tracks(
     header += further.keys()
     columns += further.values()
     table = np.column_stack(columns)[_kept_rows(len(t), len(columns))]
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with written_aside(path) as aside, aside.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows(table.tolist())

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hil.log.report_json import write_json
+from hil.log.written_aside import write_text_aside, written_aside
 from hil.sweep.cell_report import report_cell
 from hil.sweep.kept_runs import kept_runs
 from hil.sweep.spec import Sweep, spec_json
@@ -62,7 +63,7 @@ def write_results(sweep: Sweep, result: dict[str, Any], folder: Path) -> None:
         if kept:
             cell["kept"] = kept
     write_json({"spec": spec_json(sweep.spec), **result}, folder / "results.json")
-    (folder / "report.html").write_text(sweep_report(result), encoding="utf-8")
+    write_text_aside(folder / "report.html", sweep_report(result))
 
 
 def write_table(cells: list[dict[str, Any]], path: Path) -> None:
@@ -73,7 +74,8 @@ def write_table(cells: list[dict[str, Any]], path: Path) -> None:
     rows = [dict(flat(cell)) for cell in cells]
     names = list(dict.fromkeys(name for row in rows for name in row))
     table = pyarrow.table({name: [row.get(name) for row in rows] for name in names})
-    parquet.write_table(table, path)
+    with written_aside(path) as aside:
+        parquet.write_table(table, aside)
 
 
 def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

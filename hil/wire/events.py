@@ -65,6 +65,9 @@ class Event:
 
 TICK = Event()
 
+OVERSIZED = b"oversized"
+"""What is handed on in the place of a payload too large for any message; itself a message of no type."""
+
 
 def digest(topic: str, payload: bytes) -> int:
     """Identify a payload on a topic by 64 bits of BLAKE2b, so that a log can say what a step consumed."""

@@ -29,8 +29,8 @@ ANY_TIME_NS = 2**62
 FARTHEST = 1e4
 """Largest coordinate or range [m] that is believed; beyond it the squares of a filter lose their meaning."""
 
-FASTEST = 1e3
-"""Largest speed [m/s] and turn rate [rad/s] of a robot that is believed."""
+FASTEST, HARDEST = 20.0, 50.0
+"""Largest speed [m/s] and turn rate [rad/s] of a robot that is believed: none in a room reaches them."""
 
 _UNIT_TOLERANCE = 0.01
 _UPRIGHT = math.cos(math.radians(30.0))
@@ -197,7 +197,7 @@ def check_odometry(odometry: Odometry, latest_ns: int) -> CheckedMotion:
     """Check a robot's own motion; a pose that is not one of a robot on the ground is left out."""
     cause = ACCEPTED if odometry.sound else MALFORMED
     if cause == ACCEPTED:
-        cause = _pair_of_numbers_cause(odometry.v, odometry.u, FASTEST)
+        cause = _pair_of_numbers_cause(odometry.v, FASTEST, odometry.u, HARDEST)
     if cause == ACCEPTED and (not is_time(odometry.stamp) or ns_of(odometry.stamp) > latest_ns):
         cause = BAD_STAMP
     has_pose = odometry.sound and place_cause(odometry.place) == ACCEPTED
@@ -210,7 +210,7 @@ def check_sighting(seen: RangeAndBearing, latest_ns: int) -> Sighting:
     """Check a sighting of the leader."""
     cause = ACCEPTED if seen.sound else MALFORMED
     if cause == ACCEPTED:
-        cause = _pair_of_numbers_cause(seen.rho, seen.alpha2, FARTHEST)
+        cause = _pair_of_numbers_cause(seen.rho, FARTHEST, seen.alpha2, FARTHEST)
     if cause == ACCEPTED and seen.rho <= 0.0:
         cause = BAD_RANGE
     if cause == ACCEPTED and (not is_time(seen.stamp) or ns_of(seen.stamp) > latest_ns):
@@ -219,10 +219,10 @@ def check_sighting(seen: RangeAndBearing, latest_ns: int) -> Sighting:
 
 
 @kernel
-def _pair_of_numbers_cause(a: float, b: float, largest: float) -> int:
+def _pair_of_numbers_cause(a: float, most_a: float, b: float, most_b: float) -> int:
     if not math.isfinite(a) or not math.isfinite(b):
         return NOT_FINITE
-    return ACCEPTED if abs(a) <= largest and abs(b) <= largest else OUT_OF_RANGE
+    return ACCEPTED if abs(a) <= most_a and abs(b) <= most_b else OUT_OF_RANGE
 
 
 @kernel

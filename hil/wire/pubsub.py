@@ -14,7 +14,7 @@ import zenoh
 from hil.errors import UsageError
 from hil.scenario.schema import Scenario
 from hil.wire.clock_query import tell_time
-from hil.wire.events import TICK, Event
+from hil.wire.events import OVERSIZED, TICK, Event
 from hil.wire.intake import Intake, intake_of
 from hil.wire.key_layout import OURS, KeyLayout, layout_of
 from hil.wire.outlet import Outlet, gid_of, origin_of
@@ -24,6 +24,8 @@ from hil.wire.topics import ARM, STOP, urgent_topics
 
 INBOX_LIMIT, INBOX_BYTES = 100_000, 1 << 28
 """Payloads kept waiting at most; more than this is dropped and counted, so that memory stays bounded."""
+LARGEST_PAYLOAD_BYTES = 4 << 20
+"""A larger one is not taken: no message of a lab is a thousandth of that."""
 
 
 @dataclass(slots=True)
@@ -101,7 +103,10 @@ class Wire:
         for topic in topics:
 
             def keep(sample: zenoh.Sample, topic: str = topic) -> None:
-                self.inbox.put(Event(topic, sample.payload.to_bytes(), origin_of(sample)))
+                sized = len(sample.payload) <= LARGEST_PAYLOAD_BYTES
+                self.inbox.put(
+                    Event(topic, sample.payload.to_bytes() if sized else OVERSIZED, origin_of(sample))
+                )
 
             direct = zenoh.handlers.Callback(keep, indirect=False)
             key = self._layout.heard(topic)

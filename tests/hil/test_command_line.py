@@ -20,6 +20,7 @@ from hil.reports.judged_log import claimed
 from hil.scenario.checked_toml import data_folder
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
+from tests.hil.small_disk import small_disk
 
 
 def abreast(*arguments: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
@@ -150,6 +151,22 @@ def test_a_full_disk_is_told_in_one_line(tmp_path: Path, capsys: pytest.CaptureF
     assert main_code(["run", "--lockstep", "--duration", "0.3", "--out", str(tmp_path)]) == 1
     assert "No space left" in capsys.readouterr().err.splitlines()[-1]
     assert read_log(tmp_path / "run.mcap").messages > 100
+
+
+def test_a_log_that_fills_its_disk_is_whole_and_both_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with small_disk(tmp_path / "disk", 1) as folder:
+        (folder / "others").write_bytes(bytes(900_000))
+        out = folder / "out"
+        assert main_code(["run", "--lockstep", "--duration", "3", "--out", str(out)]) == 1
+        said = capsys.readouterr().err.splitlines()[-1]
+        assert (
+            f"log {out / 'run.mcap'}: writing failed (No space left on device) on disk {folder} (0.0 MB"
+            in said
+        )
+        assert read_log(out / "run.mcap").messages > 100
+        assert [each.name for each in out.iterdir()] == ["run.mcap"]
 
 
 def main_code(arguments: list[str]) -> object:

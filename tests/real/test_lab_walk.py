@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -130,9 +130,12 @@ def test_the_path_leads_to_a_formation(peers: Path, tmp_path: Path, monkeypatch:
         motive(port),
         peer("bridge natnet", path.take("bridge natnet")) as cameras,
         peer("bridge ros2", path.take("bridge ros2"), peers) as wheels,
+        ExitStack() as held,
     ):
         cameras.wait_for("ready")
         wheels.wait_for("ready")
+        for guard in (held.enter_context(peer("guard", path.take("guard"))) for _ in range(2)):
+            guard.wait_for("ready")
         with placed(lab, port, peers) as robots:
             done(path.take("doctor"))
             creeps = [path.take("doctor"), path.take("doctor")]
@@ -161,7 +164,8 @@ def test_the_path_leads_to_a_formation(peers: Path, tmp_path: Path, monkeypatch:
         assert rho < OFF_M
         summary = json.loads(Path("first/summary.json").read_text(encoding="utf-8"))
         assert summary["formation"]["orbit_deviation_rms"]["rho"] < OFF_M
-        assert summary["findings"] == []
+        # A machine that is busy with all of this may hold a command up.
+        assert {each["name"] for each in summary["findings"]} <= {"command_gaps"}
         done(["-m", "hil", "replay", "first/run.mcap", "--verify"])
         with (
             placed(lab, port, peers) as robots,

@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,16 @@ def real_run(lab: Lab, endpoint: str, folder: Path, *options: str) -> Iterator[P
     with peer("run", command) as begun:
         begun.wait_for("robots and bridges connect to")
         yield begun
+
+
+@contextmanager
+def guards(lab: Lab, endpoint: str) -> Iterator[None]:
+    """Those of the robots that abreast commands."""
+    with ExitStack() as held:
+        for robot in ("follower",) if lab.hand else ("leader", "follower"):
+            options = ["--robot", robot, "--connect", endpoint, *lab.settings()]
+            held.enter_context(peer("guard", ["-m", "hil", "guard", "turtlebot3", *options]))
+        yield
 
 
 def verified(log: Path) -> dict[str, Any]:
@@ -67,6 +77,7 @@ def test_a_real_pair_keeps_to_the_orbit_and_is_judged_and_repeated(
         real_run(lab, endpoint, folder, *options) as run,
         standing(lab, peers) as (robots, _),
         bridge(lab, endpoint, peers),
+        guards(lab, endpoint),
     ):
         if lab.hand:
             run.wait_for(f"drive {lab.bodies[0]!r} off by hand", PATIENCE)

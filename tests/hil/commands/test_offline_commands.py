@@ -247,7 +247,7 @@ def test_a_cut_off_log_is_recovered_as_the_error_says(abreast: Any, run_log: Pat
     assert answer.code == 2
     assert f"abreast recover {cut} --out LOG" in answer.err
     answer = abreast("recover", cut, "--out", whole)
-    assert (answer.code, answer.out) == (0, "")
+    assert (answer.code, answer.out) == (1, "")
     assert "cut off" in answer.err
     with AnyReader([whole]) as reader:
         assert reader.message_count > 500

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hil.nodes.findings import findings_in
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.messages import decode_as
@@ -71,6 +72,19 @@ class Run:
             return driving == set(truths)
 
         with self.listening(*truths) as wire:
+            self.wait_until(look)
+
+    def wait_until_found(self, node: str, name: str) -> None:
+        """Wait until a node reports a finding."""
+
+        def look() -> bool:
+            while (event := wire.inbox.take(0.0)) is not None:
+                found = findings_in(decode_as(event.payload, msg.DiagnosticArray))
+                if name in found.get(node, {}):
+                    return True
+            return False
+
+        with self.listening(topics.DIAGNOSTICS) as wire:
             self.wait_until(look)
 
     def wait_until_refused(self, counts: dict[str, int]) -> None:

@@ -185,6 +185,23 @@ def test_a_killed_recorder_leaves_a_log_that_is_made_whole(start: Callable[..., 
 
 
 @pytest.mark.slow
+def test_a_folder_that_is_moved_away_during_a_run_is_told_at_once(
+    start: Callable[..., Run], tmp_path: Path
+) -> None:
+    run = start(duration=600.0)
+    run.wait_until_driving(topics.TRUTH)
+    folder, elsewhere = run.log.parent, tmp_path / "elsewhere"
+    folder.rename(elsewhere)
+    run.wait_until_found("recorder", "disk")
+    run.process.send_signal(signal.SIGINT)
+    code, _, err = run.finish()
+    assert code == 1
+    assert f"log {run.log} is not there any more" in err.splitlines()[-1]
+    assert "Traceback" not in err
+    assert read_log(elsewhere / run.log.name).messages > 100
+
+
+@pytest.mark.slow
 def test_nonsense_moves_nobody_and_an_interrupt_leaves_a_whole_log(start: Callable[..., Run]) -> None:
     each, rounds = 100, 5
     run = start(duration=600.0)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import contextlib
 import os
 import random
 import resource
@@ -70,8 +71,14 @@ def test_a_cut_anywhere_loses_only_what_follows_the_last_whole_chunk(whole: Path
     for number, length in enumerate(cuts):
         torn, rescued = tmp_path / f"torn{number}.mcap", tmp_path / f"rescued{number}.mcap"
         torn.write_bytes(content[:length])
+        kept = max((count for end, count in ends if end <= length), default=0)
+        if not kept:
+            with pytest.raises(UsageError, match="nothing to recover"):
+                recover(torn, rescued)
+            assert not rescued.exists()
+            continue
         found = recover(torn, rescued)
-        assert found.messages == max((count for end, count in ends if end <= length), default=0)
+        assert found.messages == kept
         assert found.bytes == rescued.stat().st_size
         records = list(read_log(rescued).records())
         assert len(records) == found.messages
@@ -160,7 +167,10 @@ def test_random_damage_never_raises_and_never_invents_a_message(whole: Path, tmp
             damaged[draw.randrange(8, len(content))] ^= 1 << draw.randrange(8)
         source, rescued = tmp_path / f"damaged{number}.mcap", tmp_path / f"rescued{number}.mcap"
         source.write_bytes(damaged)
-        recover(source, rescued)
+        with contextlib.suppress(UsageError):
+            recover(source, rescued)
+        if not rescued.exists():
+            continue
         with rescued.open("rb") as stream:
             assert {message.data for _, _, message in make_reader(stream).iter_messages()} <= originals
 

@@ -12,6 +12,7 @@ from hil.wire.message_checks import (
     ANY_TIME_NS,
     FARTHEST,
     FASTEST,
+    HARDEST,
     Cause,
     check_frame,
     check_odometry,
@@ -217,10 +218,12 @@ NUMBERS = [
     ("v", "u", "cause"),
     [
         *NUMBERS,
-        (FASTEST, -FASTEST, Cause.ACCEPTED),
-        (-FASTEST, FASTEST, Cause.ACCEPTED),
+        (FASTEST, -HARDEST, Cause.ACCEPTED),
+        (-FASTEST, HARDEST, Cause.ACCEPTED),
         (1.001 * FASTEST, 0.0, Cause.OUT_OF_RANGE),
-        (0.0, -1.001 * FASTEST, Cause.OUT_OF_RANGE),
+        (0.0, -1.001 * HARDEST, Cause.OUT_OF_RANGE),
+        (900.0, 0.0, Cause.OUT_OF_RANGE),
+        (0.1, 2.0 * math.pi / 0.05, Cause.OUT_OF_RANGE),  # a yaw that wraps between two samples at 20 Hz
     ],
 )
 def test_odometry_is_two_believable_numbers(v: float, u: float, cause: Cause) -> None:
@@ -293,4 +296,4 @@ def test_any_time_is_later_than_every_stamp_and_a_number_of_64_bits() -> None:
 
 def test_how_far_a_message_is_believed() -> None:
     """docs/lab.md tells people the tolerance of clocks."""
-    assert (FARTHEST, FASTEST, CLOCK_TOLERANCE_NS) == (10_000.0, 1000.0, 50_000_000)
+    assert (FARTHEST, FASTEST, HARDEST, CLOCK_TOLERANCE_NS) == (10_000.0, 20.0, 50.0, 50_000_000)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from hil.wire.pubsub import Wire
+from hil.wire.events import OVERSIZED, Event
+from hil.wire.pubsub import LARGEST_PAYLOAD_BYTES, Inbox, Wire
 from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
 
 PATIENCE = 60.0
@@ -53,3 +54,33 @@ def test_a_waiting_inbox_can_be_woken() -> None:
         event = wire.inbox.take(PATIENCE)
     assert event is not None
     assert event.topic == ""
+
+
+def test_a_payload_beyond_all_measure_is_not_taken_and_said_to_have_come() -> None:
+    with wires() as (mouth, ear):
+        while ear.inbox.take(0.1) is None:
+            mouth.publish("a", b"hello")
+        mouth.publish("a", bytes(LARGEST_PAYLOAD_BYTES + 1))
+        mouth.publish("a", bytes(LARGEST_PAYLOAD_BYTES))
+        heard: list[bytes] = []
+        while len(heard) < 2:
+            event = ear.inbox.take(PATIENCE)
+            assert event is not None
+            heard += [event.payload] * (event.payload != b"hello")
+    assert heard[0] is OVERSIZED
+    assert heard[1] == bytes(LARGEST_PAYLOAD_BYTES)
+
+
+def test_what_waits_is_bounded_in_bytes_too() -> None:
+    inbox, large = Inbox(), Event("a", bytes(LARGEST_PAYLOAD_BYTES))
+    for _ in range(100):
+        inbox.put(large)
+    assert inbox.dropped == 100 - 64
+    inbox.put(Event("a", b"small"))
+    taken = [inbox.take(0.0) for _ in range(66)]
+    assert taken[:64] == [large] * 64
+    assert taken[64] == Event("a", b"small")
+    assert taken[65] is None
+    inbox.put(large)
+    assert inbox.take(0.0) == large
+    assert inbox.dropped == 36
