@@ -202,7 +202,7 @@ def _reports_on(wire: Wire, presence: Presence, senders: SenderWatch) -> Callabl
     """What there is to say at a time of what comes and of who listens."""
     listeners = presence.make_watch(wire) if presence.make_watch else None
     intake = wire.inbox.intake
-    second = SenderReports(presence.name, senders, presence.hear)
+    second = SenderReports(presence.name, senders, wire.clients(), presence.hear)
     flood = FloodWatch(presence.name, intake, presence.hear) if intake is not None else None
 
     def reports(now_ns: int) -> Iterator[Outgoing]:

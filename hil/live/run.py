@@ -32,7 +32,9 @@ from hil.wire import topics
 from hil.wire.key_layout import layout_of
 from hil.wire.lab_robots import robots_of
 from hil.wire.messages import encode
+from hil.wire.outlet import UNSIGNED
 from hil.wire.pubsub import Wire
+from hil.wire.router_clients import named_suspects
 from hil.wire.session import Endpoints, allowed_keys, close_session, open_session
 from hil.wire.topics import link_topics, urgent_topics
 
@@ -47,6 +49,9 @@ STANDSTILL_TIMEOUT = 10.0
 _GLANCE = 0.05
 _LAST_BREATH = 1.0
 """From the stop that a daemon says as it breaks down to its end [s]."""
+
+_ANSWER_S = 0.5
+"""For routers to tell who is connected [s]."""
 
 Show = Callable[[Snapshot, float | None], None]
 
@@ -217,6 +222,11 @@ class _Supervisor:
         else:
             assert held is not None
             who, reason = held[1].who, f"{held[0]} {held[1].text}"
+        if UNSIGNED in who:
+            clients = self._wire.clients()
+            clients.ask()
+            clients.wait(_ANSWER_S)
+            who = named_suspects(who, clients.suspects())
         self._tell_who_stopped(who, reason)
         return f"{when}: {reason} (by {who})"
 

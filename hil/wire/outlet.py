@@ -52,9 +52,13 @@ def _attached(attached: zenoh.ZBytes | None) -> Origin | None:
     return Origin(gid.hex(), 0, number % NUMBERS) if length == len(gid) else None
 
 
+UNSIGNED = "somebody without a session"
+"""Who sent a message that says nothing of its sender."""
+
+
 def sender_of(origin: Origin | None) -> str:
     """Whom to name for a message."""
-    return f"session {origin.session}" if origin is not None else "somebody without a session"
+    return f"session {origin.session}" if origin is not None else UNSIGNED
 
 
 def gid_of(told: str) -> bytes:

@@ -19,6 +19,7 @@ from hil.wire.intake import Intake, intake_of
 from hil.wire.key_layout import OURS, KeyLayout, layout_of
 from hil.wire.outlet import Outlet, gid_of, origin_of
 from hil.wire.ros_tokens import Endpoint, all_tokens, endpoint_in, endpoint_token, node_token
+from hil.wire.router_clients import RouterClients
 from hil.wire.session import Endpoints, allowed_keys, close_session, open_session
 from hil.wire.topics import ARM, STOP, urgent_topics
 
@@ -153,6 +154,10 @@ class Wire:
     def graph(self) -> tuple[Endpoint, ...]:
         """Publishers and subscriptions of everybody, as far as they show in the ROS graph."""
         return tuple(self._graph.copy().values())
+
+    def clients(self) -> RouterClients:
+        """Who is connected to the lab's routers, for who asks."""
+        return RouterClients(self._session, self._layout)
 
     def wake(self) -> None:
         """Make a waiting :meth:`Inbox.take` return at once."""

@@ -73,6 +73,15 @@ def topic_tokens(layout: KeyLayout, topic: str, *, publishes: bool) -> str:
     return layout.within(f"@ros2_lv/{layout.domain}/*/*/*/{kind}/*/*/*/%{name.replace('/', '%')}/*/*/*")
 
 
+def session_in(layout: KeyLayout, token: str) -> str:
+    """Id of the session that shows a token of any kind, empty for what is none."""
+    parts = token.removeprefix(layout.within("")).split("/")
+    match parts:
+        case ["@", session, "@ros2_lv", *_] | ["@ros2_lv", _, session, *_]:
+            return session
+    return ""
+
+
 def endpoint_in(layout: KeyLayout, token: str) -> Endpoint | None:
     """The publisher or subscription that a token stands for; None for one that stands for something else."""
     own = layout.within("")

@@ -121,6 +121,9 @@ def _lay_over(config: zenoh.Config, connect: str | None, listen: str | None) -> 
         _set(config, "connect/endpoints", [connect])
     if listen:
         _set(config, "listen/endpoints", [listen])
+    if listens_at(config) and not _differs(config, "adminspace/enabled"):
+        # Whoever is connected can be told from those who take part.
+        _set(config, "adminspace/enabled", True)
     if connects_to(config) and _said(config, "mode") != "client":
         for key, answered in _ANSWERED.items():
             if not _differs(config, key):

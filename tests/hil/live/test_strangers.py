@@ -81,6 +81,22 @@ def say_stop(wire: Wire) -> None:
     wire.publish(topics.STOP, encode(String(data="because")))
 
 
+def test_who_does_not_sign_a_stop_is_among_the_suspects(tmp_path: Path) -> None:
+    with live_run(tmp_path) as run:
+        run.wait_until_driving(topics.TRUTH)
+        stranger = open_session(Endpoints(connect=run.endpoint))
+        try:
+            stranger.put(topics.STOP, encode(String(data="because")))
+            summary = ended(run)
+            named = str(stranger.zid())
+        finally:
+            close_session(stranger)
+    assert summary["stopped_by"]["reason"] == "because"
+    assert summary["stopped_by"]["who"].startswith(
+        f"somebody without a session (perhaps session {named} at tcp/"
+    )
+
+
 @pytest.mark.parametrize(("say", "words"), [(forge_commands, "second sender"), (say_stop, "because")])
 def test_who_forges_a_command_or_says_stop_ends_the_run_and_is_named(
     tmp_path: Path, say: Callable[[Wire], None], words: str

@@ -76,11 +76,12 @@ def test_what_waits_is_bounded_in_bytes_too() -> None:
     for _ in range(100):
         inbox.put(large)
     assert inbox.dropped == 100 - 64
+    assert inbox.take(0.0) == large
     inbox.put(Event("a", b"small"))
-    taken = [inbox.take(0.0) for _ in range(66)]
-    assert taken[:64] == [large] * 64
-    assert taken[64] == Event("a", b"small")
-    assert taken[65] is None
+    taken = [inbox.take(0.0) for _ in range(65)]
+    assert taken[:63] == [large] * 63
+    assert taken[63] == Event("a", b"small")
+    assert taken[64] is None
     inbox.put(large)
     assert inbox.take(0.0) == large
     assert inbox.dropped == 36
