@@ -303,6 +303,9 @@ def _make_whole(log_path: Path, cut: Path) -> None:
             recover(log_path, whole)
         except AbreastError as error:
             click.echo(f"the log was cut off and stays so: {error}", err=True)
+            if isinstance(error, UsageError) and cut.suffix == ".cut":
+                # The other pieces are read without one of which nothing is left.
+                log_path.rename(cut)
             return
         log_path.rename(cut)
         whole.rename(log_path)

@@ -29,7 +29,7 @@ class DiskSync:
         self._thread.start()
 
     def follow(self, path: Path, descriptor: int) -> None:
-        """Sync this file from now on, its entry in its folder at once, and the one before a last time."""
+        """Sync this file from now on, its folder's entry of it too, and the file before a last time."""
         with contextlib.suppress(OSError):
             # A file of which the folder does not tell is lost by a power cut, however well it was synced.
             folder = os.open(path.parent, os.O_RDONLY)

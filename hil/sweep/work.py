@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from hil.errors import UsageError
 from hil.lockstep.flyer import STOPPING_S, Flyer
+from hil.log.written_aside import written_aside
 from hil.scenario.certificate import assumptions_of
 from hil.scenario.files import build_scenario, scenario_text
 from hil.scenario.schema import Scenario
@@ -85,9 +85,8 @@ class Store:
             self._parts.mkdir(parents=True, exist_ok=True)
             if not mark.exists():
                 # Whole or not there, and left alone ever after: half a mark would be that of another sweep.
-                unfinished = mark.with_suffix(".unfinished")
-                unfinished.write_text(sweep.digest())
-                os.replace(unfinished, mark)
+                with written_aside(mark) as aside:
+                    aside.write_text(sweep.digest())
             elif mark.read_text() != sweep.digest():
                 raise UsageError(
                     f"--out {folder}: holds another sweep, or one of another version of abreast; "
@@ -106,8 +105,5 @@ class Store:
 
     def save(self, piece: Piece, tallies: NDArray[np.void]) -> None:
         """Keep the tallies of a piece; a file is either whole or not there."""
-        path = self._parts / piece.name
-        unfinished = path.with_suffix(".unfinished")
-        with unfinished.open("wb") as file:
+        with written_aside(self._parts / piece.name) as aside, aside.open("wb") as file:
             np.save(file, tallies, allow_pickle=False)
-        os.replace(unfinished, path)

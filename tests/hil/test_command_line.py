@@ -16,6 +16,7 @@ from hil.judge.run_data import run_data_of_log
 from hil.live.run import Outcome
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import Log, read_log
+from hil.log.rotating_log import log_place
 from hil.reports.judged_log import claimed
 from hil.scenario.checked_toml import data_folder
 from hil.scenario.files import load_scenario
@@ -187,6 +188,40 @@ def test_a_run_that_broke_down_says_so_even_without_room_for_a_verdict(
     assert main_code(["run", "--out", str(tmp_path)]) == 1
     told = "the run broke down: the recorder ended; the robots were told to stand, the log is"
     assert told in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_pieces_of_a_log_are_made_whole_or_put_aside(
+    tmp_path: Path, short_log: Log, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    content = short_log.path.read_bytes()
+
+    def broken(scenario: Scenario, log_path: Path, _live: object) -> Outcome:
+        place = log_place(log_path, scenario.recorder)
+        place.mkdir()
+        (place / "run_0.mcap").write_bytes(content[: -len(content) // 10])
+        (place / "run_1.mcap").write_bytes(content[:1000])
+        return Outcome("the recorder was killed", False, 0.0, "the robots stand", recorded=True)
+
+    monkeypatch.setattr("hil.commands.run._live", broken)
+    assert main_code(["run", "--out", str(tmp_path), "--set", "recorder.rotate_s=1"]) == 1
+    said = capsys.readouterr().err
+    assert "the run broke down: the recorder was killed" in said.splitlines()[-1]
+    assert "run_1.mcap: holds nothing to recover" in said
+    names = sorted(each.name for each in (tmp_path / "run").iterdir())
+    assert names == ["run_0.mcap", "run_0.mcap.cut", "run_1.mcap.cut"]
+    assert read_log(tmp_path / "run" / "run_0.mcap").messages > 100
+    assert (tmp_path / "summary.json").exists()
+
+
+def test_a_log_that_is_gone_after_a_run_is_what_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def driven(*_: object) -> Outcome:
+        return Outcome("", False, 1.0, "the robots stand", recorded=True)
+
+    monkeypatch.setattr("hil.commands.run._live", driven)
+    assert main_code(["run", "--out", str(tmp_path)]) == 1
+    assert f"log {tmp_path / 'run.mcap'} is not there any more" in capsys.readouterr().err
 
 
 def test_times_of_a_recording_may_count_from_1970(capsys: pytest.CaptureFixture[str]) -> None:
