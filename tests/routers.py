@@ -10,11 +10,11 @@ from hil.wire.session import Endpoints, close_session, open_session, reserved_en
 
 
 @contextmanager
-def router() -> Iterator[tuple[str, Wire]]:
-    """Its endpoint, and an ear and a mouth on it."""
+def router(allowed: frozenset[str] | None = None) -> Iterator[tuple[str, Wire]]:
+    """Its endpoint, and an ear and a mouth on it, which says only what is ``allowed``."""
     with reserved_endpoint() as endpoint:
         session = open_session(Endpoints(listen=endpoint))
-        wire = Wire(session)
+        wire = Wire(session, allowed=allowed)
         try:
             yield endpoint, wire
         finally:

@@ -60,7 +60,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
             load_own_parts(chosen, estimates=name != "controller")
         needed = frozenset(filter(None, needs.split(",")))
         links = tuple(link_of(chosen, name) for name in dict.fromkeys(followers)) or links_of(chosen)
-        order = Order(chosen, links, out, needed, options, countdown, by_hand)
+        order = Order(chosen, links, out, needed, options, countdown, by_hand, secure is not None)
         if alone:
             serve_alone(order, ending, duration)
             return

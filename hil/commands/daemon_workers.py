@@ -30,6 +30,7 @@ class Order:
     ``links``: the followers that it serves, if it serves any. ``out``: the recorder's log.
     ``needs``: the daemons that emulator or leader wait for. ``natnet``: how the emulator serves its frames by
     NatNet. ``countdown_s``: from then on to when the leader sets off; ``by_hand``: somebody else drives it.
+    ``by_keys``: these leave orders to operators and guards.
     """
 
     scenario: Scenario
@@ -39,6 +40,7 @@ class Order:
     natnet: NatNetOptions
     countdown_s: float = 0.0
     by_hand: bool = False
+    by_keys: bool = False
 
 
 def _leader(order: Order) -> Worker:
@@ -50,7 +52,11 @@ def _leader(order: Order) -> Worker:
     if order.by_hand:
         return NodeWorker([LeaderWatch(order.scenario, order.needs)], on_report=on_report())
     driver = LeaderDriver(order.scenario, order.needs, order.countdown_s)
-    parting = Parting("the leader ended", lambda now_ns: [leader_standstill(order.scenario, now_ns)])
+    parting = Parting(
+        "the leader ended",
+        lambda now_ns: [leader_standstill(order.scenario, now_ns)],
+        stop_all=not order.by_keys,
+    )
     return NodeWorker([driver], parting=parting, on_report=on_report())
 
 
@@ -183,7 +189,11 @@ def _parting(name: str, order: Order) -> Parting:
     from hil.live.node_worker import Parting
     from hil.nodes.link_nodes import standstill
 
-    return Parting(f"the {name} ended", lambda now_ns: [standstill(link, now_ns) for link in order.links])
+    return Parting(
+        f"the {name} ended",
+        lambda now_ns: [standstill(link, now_ns) for link in order.links],
+        stop_all=not order.by_keys,
+    )
 
 
 def _recorder(order: Order) -> Worker:

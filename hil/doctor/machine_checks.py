@@ -35,7 +35,8 @@ def port_check(port: int, host: str = "127.0.0.1") -> Check:
 def route_check(endpoint: str, reason: str) -> Check:
     """Whether the router was reached; ``reason``: why not, empty if it was."""
     advice = (
-        "start abreast run --real, a recorder or a bridge that listens, or name another one with --connect"
+        "start abreast router, or a run or bridge that listens, or name another one with --connect; "
+        "one that has keys wants --secure DIR"
     )
     seen = reason or f"a router at {endpoint}"
     return check("router", not reason, seen, f"a router at {endpoint}", advice)

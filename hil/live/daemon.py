@@ -21,7 +21,6 @@ from hil.wire.events import TICK, Event
 from hil.wire.pubsub import Inbox, Wire, joined
 from hil.wire.senders import SenderWatch, single_topics
 from hil.wire.session import Endpoints
-from hil.wire.topics import STOP
 
 _LONGEST_WAIT = 0.1
 _LINGER = 0.05
@@ -217,9 +216,7 @@ def _reports_on(wire: Wire, presence: Presence, senders: SenderWatch) -> Callabl
 
 
 def _part(worker: Worker, wire: Wire) -> None:
-    # Where keys say that only operators and guards give orders, a parting stop is not ours to say.
-    last = worker.end(time.time_ns())
-    _publish(wire, (each for each in last if each.topic != STOP or wire.may_publish(STOP)))
+    _publish(wire, worker.end(time.time_ns()))
     time.sleep(_LINGER)
 
 

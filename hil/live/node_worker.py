@@ -21,11 +21,13 @@ class Parting:
 
     ``reason``: of the stop message that they publish and are told, like everybody else: so a controller's
     last command is a standstill, and the log holds the reason. ``standstill``: at a time, what makes all
-    their robots stand without them, should one break down even then.
+    their robots stand without them, should one break down even then, or where they do not ``stop_all``: keys
+    may leave orders to operators and guards, and what was not said to all no log would hold.
     """
 
     reason: str
     standstill: Callable[[int], Iterable[Outgoing]]
+    stop_all: bool = True
 
 
 class NodeWorker:
@@ -98,8 +100,10 @@ class NodeWorker:
                 return
 
     def end(self, now_ns: int) -> Iterator[Outgoing]:
-        """The parting stop, if any, and the nodes' final reports."""
-        if self._parting is not None:
+        """The parting stop or standstill, if any, and the nodes' final reports."""
+        if self._parting is not None and not self._parting.stop_all:
+            yield from self._parting.standstill(now_ns)
+        elif self._parting is not None:
             stop = outgoing(topics.STOP, String(data=self._parting.reason), now_ns)
             yield stop
             try:

@@ -1,7 +1,7 @@
 """Who may say and hear what on a lab's wire: roles, and Zenoh's access control made of them by topic.
 
 What is not allowed here is refused by the router. Nobody may delete, or publish by
-a wildcard, or ask for anything but the time.
+a wildcard, or ask for anything but the time and who is connected.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from hil.wire.clock_query import CLOCKS
 from hil.wire.key_layout import KeyLayout, layout_of
 from hil.wire.roles import GUARD, Role
 from hil.wire.ros_tokens import all_tokens, node_tokens, topic_tokens
+from hil.wire.router_clients import ROUTERS
 from hil.wire.source_topics import source_topics
 from hil.wire.topics import ARM, DIAGNOSTICS, ONLY_IN_LOGS, RIGID_BODIES, STOP, link_topics, types_of
 
@@ -147,7 +148,16 @@ def _rules(layout: KeyLayout, role: Role, access: Access, driving: frozenset[str
         _rule(f"{role} shows itself", ("liveliness_token",), "ingress", tokens),
         _rule(f"{role} looks around", ("declare_liveliness_subscriber", "liveliness_query"), "ingress", seen),
         _rule(f"{role} sees", ("liveliness_token",), "egress", seen),
+        *(_client_rules(role) if access.says else []),
         *_clock_rules(role, answers=bool(access.says & driving)),
+    ]
+
+
+def _client_rules(role: Role) -> list[dict[str, Any]]:
+    """Whoever takes part may ask the router who is connected."""
+    return [
+        _rule(f"{role} asks who is connected", ("query",), "ingress", [ROUTERS]),
+        _rule(f"{role} is told who is connected", ("reply", "declare_queryable"), "egress", [ROUTERS]),
     ]
 
 

@@ -49,9 +49,11 @@ class Ros:
 
 
 @contextmanager
-def bridged() -> Iterator[tuple[Ros, RosBridge, Wire, list[str]]]:
+def bridged(
+    allowed: frozenset[str] | None = None,
+) -> Iterator[tuple[Ros, RosBridge, Wire, list[str]]]:
     ros, said = Ros(), list[str]()
-    with router() as (_, wire):
+    with router(allowed) as (_, wire):
         bridge = RosBridge(wire, ROUTES, lambda _: ros, said.append)
         try:
             yield ros, bridge, wire, said
@@ -108,3 +110,18 @@ def test_a_leader_is_deaf_once_it_was_told_to_drive(told: list[str], names: set[
         (said,) = bridge.take(4 * S)
         found = findings_in(decode_as(said.payload, DiagnosticArray))["bridge/ros2"]
     assert {name for name in ("leader", "follower") if f"/{name}/cmd_vel" in found["deaf_robot"]} == names
+
+
+def test_orders_from_ros_that_keys_leave_to_others_are_dropped_and_told_once() -> None:
+    with bridged(frozenset({"follower/odom", "diagnostics"})) as (_, bridge, _, said):
+        for _ in range(3):
+            for topic in ("stop", "follower/side", "follower/odom"):
+                bridge._hear(topic, topic.encode())
+            time.sleep(0.01)
+        brought = [each.topic for each in bridge.take(S)]
+    assert "follower/odom" in brought
+    assert not {"stop", "follower/side"} & set(brought)
+    assert [line for line in said if "keys" in line] == [
+        f"our keys do not let {topic} through from ROS; it is dropped, as others like it"
+        for topic in ("stop", "follower/side")
+    ]

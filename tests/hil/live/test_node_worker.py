@@ -166,3 +166,14 @@ def test_what_a_node_finds_is_said_where_it_runs() -> None:
     begun, ended = lines
     assert begun.startswith("finder finds clock: an hour behind; ")
     assert ended == "finder finds clock no more"
+
+
+def test_who_may_not_stop_all_lets_its_own_robots_stand_and_hears_no_stop_that_no_log_holds() -> None:
+    links = links_of(load_scenario("chain5"))
+    parting = Parting("the end", lambda now_ns: [standstill(link, now_ns) for link in links], stop_all=False)
+    worker = NodeWorker(map(controller_node, links), parting=parting)
+    worker.begin(0)
+    said = list(worker.end(1))
+    still = [standstill(link, 1) for link in links]
+    assert said[: len(links)] == still
+    assert {each.topic for each in said[len(links) :]} == {topics.DIAGNOSTICS}

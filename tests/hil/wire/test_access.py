@@ -263,4 +263,18 @@ def test_every_subject_is_a_role_with_rules_that_are_there() -> None:
     assert {name for each in made["subjects"] for name in each["cert_common_names"]} == set(CLIENTS)
     assert not any("delete" in rule["messages"] for rule in made["rules"])
     asked = [rule for rule in made["rules"] if {"query", "reply"} & set(rule["messages"])]
-    assert {key for rule in asked for key in rule["key_exprs"]} == {"abreast/clock/*"}
+    assert {key for rule in asked for key in rule["key_exprs"]} == {"abreast/clock/*", "@/*/router"}
+
+
+def test_who_takes_part_may_ask_who_is_connected_and_a_viewer_may_not(plain: TlsLab) -> None:
+    with tls_lab(plain.folder) as lab:
+        operator, viewer = lab.wire("operator", TURTLEBOT3), lab.session("viewer")
+        clients = operator.clients()
+        deadline = time.monotonic() + PATIENCE
+        while not clients.suspects() and time.monotonic() < deadline:
+            clients.ask()
+            clients.wait(SILENCE_S)
+        (suspect,) = clients.suspects()
+        assert str(viewer.zid()) in suspect
+        assert not list(viewer.get("@/*/router", timeout=SILENCE_S))
+        assert not list(viewer.get("@/*/router/**", timeout=SILENCE_S))

@@ -8,7 +8,15 @@ from hypothesis import strategies as st
 
 from hil.scenario.files import load_scenario
 from hil.wire.key_layout import KeyLayout, layout_of
-from hil.wire.ros_tokens import Endpoint, all_tokens, endpoint_in, endpoint_token, node_token
+from hil.wire.ros_tokens import (
+    Endpoint,
+    all_tokens,
+    endpoint_in,
+    endpoint_token,
+    node_token,
+    node_tokens,
+    topic_tokens,
+)
 
 TOPIC = "follower/cmd_vel"
 LAYOUTS = [
@@ -41,6 +49,25 @@ def test_what_is_written_is_what_is_read(
     assert endpoint_in(layout, token) == written
     assert zenoh.KeyExpr(all_tokens(layout)).includes(zenoh.KeyExpr(token))
     assert str(zenoh.KeyExpr.autocanonize(token)) == token
+    for other in layout.types:
+        for says in (True, False):
+            pattern = zenoh.KeyExpr(topic_tokens(layout, other, publishes=says))
+            assert pattern.includes(zenoh.KeyExpr(token)) == ((other, says) == (topic, publishes))
+    node = zenoh.KeyExpr(node_tokens(layout))
+    assert node.includes(zenoh.KeyExpr(node_token(layout, session, "abreast_controller")))
+    assert not node.intersects(zenoh.KeyExpr(token))
+
+
+def test_a_robots_own_tokens_of_rmw_zenoh_are_those_of_its_topics() -> None:
+    """As the design of rmw_zenoh has them: with an enclave and a namespace of the node."""
+    layout = layout_of(load_scenario("turtlebot3", ["wire.layout=rmw_zenoh", "wire.domain=30"]))
+    hashed = "RIHS01_" + 64 * "0"
+    token = zenoh.KeyExpr(
+        f"@ros2_lv/30/aac3178e146ba6f1fc6e6a4085e77f21/0/10/MP/%/%follower/diff_drive/%follower%odom/"
+        f"nav_msgs::msg::dds_::Odometry_/{hashed}/::,10:,:,:,,"
+    )
+    assert zenoh.KeyExpr(topic_tokens(layout, "follower/odom", publishes=True)).includes(token)
+    assert not zenoh.KeyExpr(topic_tokens(layout, "leader/odom", publishes=True)).includes(token)
 
 
 def test_a_bridge_reads_type_and_quality_in_its_own_way() -> None:
