@@ -86,7 +86,7 @@ STOP = topics.STOP, msg.String(data="enough")
 def test_a_stop_before_the_leader_sets_off_ends_the_run(lab: tuple[Wire, _Supervisor]) -> None:
     wire, supervisor = lab
     outcome = outcome_of(supervisor, wire, STOP)
-    assert outcome.failure == "stopped before the leader set off: enough"
+    assert outcome.failure.startswith("stopped before the leader set off: enough (by session ")
     assert (outcome.interrupted, outcome.duration_s) == (False, 0.0)
 
 
@@ -96,12 +96,21 @@ def test_a_stop_that_cannot_be_read_does_too(lab: tuple[Wire, _Supervisor]) -> N
     assert outcome.failure.startswith("stopped before the leader set off: ")
 
 
-def test_a_stop_after_that_is_no_failure(lab: tuple[Wire, _Supervisor]) -> None:
+def test_a_stop_after_that_ends_the_run_before_its_time(lab: tuple[Wire, _Supervisor]) -> None:
     wire, supervisor = lab
-    now_ns = time.time_ns()
-    set_off = diagnostics("leader", now_ns, "", {"motion_since_ns": now_ns})
-    outcome = outcome_of(supervisor, wire, (topics.DIAGNOSTICS, set_off), STOP)
-    assert outcome.failure == ""
+    outcome = outcome_of(supervisor, wire, set_off(), STOP)
+    assert outcome.failure.startswith("stopped before")
+    assert ": enough (by session " in outcome.failure
+
+
+def test_a_guard_that_holds_its_robot_ends_the_run(lab: tuple[Wire, _Supervisor]) -> None:
+    wire, supervisor = lab
+    values = {"latched": "fence", "latched_by": "follower"}
+    held = diagnostics("guard/follower", time.time_ns(), "latched (fence): outside", values)
+    outcome = outcome_of(supervisor, wire, set_off(), (topics.DIAGNOSTICS, held))
+    assert outcome.failure == (
+        "stopped before its time: guard/follower latched (fence): outside (by follower)"
+    )
 
 
 def set_off() -> tuple[str, msg.Message]:
@@ -138,9 +147,9 @@ def test_what_robots_said_before_their_links_were_gone_is_no_standstill(
         follower_gone.set()
         time.sleep(0.2)
         outcome = outcome_of(supervisor, wire, STOP)
-    assert outcome.failure == (
-        "stopped before the leader set off: enough; "
-        "leader, follower have not been seen to stand within 1 s; use their switch"
+    assert outcome.failure.startswith("stopped before the leader set off: enough (by session ")
+    assert outcome.failure.endswith(
+        "; leader, follower have not been seen to stand within 1 s; use their switch"
     )
     assert outcome.robots == "the robots were told to stand"
 
