@@ -87,13 +87,13 @@ class Run:
         with self.listening(topics.DIAGNOSTICS) as wire:
             self.wait_until(look)
 
-    def wait_until_refused(self, counts: dict[str, int]) -> None:
-        """Wait until the estimator reports that it has refused so many inputs, by cause."""
+    def wait_until_refused(self, node: str, counts: dict[str, int]) -> None:
+        """Wait until a node reports that it has refused so many inputs, by cause."""
 
         def look() -> bool:
             while (event := wire.inbox.take(0.0)) is not None:
                 for status in decode_as(event.payload, msg.DiagnosticArray).status:
-                    if status.name == "abreast/estimator":
+                    if status.name == f"abreast/{node}":
                         values = {each.key: each.value for each in status.values}
                         if all(
                             values.get(f"refused.{cause}") == str(count) for cause, count in counts.items()

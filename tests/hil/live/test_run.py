@@ -230,16 +230,17 @@ def test_nonsense_moves_nobody_and_an_interrupt_leaves_a_whole_log(start: Callab
             for payload in nonsense.values():
                 for _ in range(each):
                     wire.publish(topics.RIGID_BODIES, payload)
-            run.wait_until_refused(dict.fromkeys(nonsense, each * (past + 1)))
+            # It comes from somebody who is not listened to beside the motion capture.
+            refused = each * len(nonsense) * (past + 1)
+            run.wait_until_refused("follower_senders", {topics.RIGID_BODIES: refused})
     run.process.send_signal(signal.SIGINT)
     code, summary, err = run.finish()
-    assert code == 0, err
+    assert code == 130, err
     assert "interrupted" in err
     assert run.daemons() == {}
     assert summary["duration_s"] < 600.0
-    assert {cause: summary["rejected"].get(cause) for cause in nonsense} == dict.fromkeys(
-        nonsense, each * rounds
-    )
+    assert "second_sender" in {found["name"] for found in summary["findings"]}
+    assert not nonsense.keys() & summary["rejected"].keys()
     assert few_frames_lost(summary)
     assert summary["bounds"]["violations"]["v1_extended"] == 0
     for _, sent in commands(run.log):
