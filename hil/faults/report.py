@@ -18,7 +18,7 @@ class Skipped(NamedTuple):
 NEVER_TRIED = (
     Skipped(
         "reorder",
-        "TCP keeps the order of what it carries, and this kernel may have no other way to change it",
+        "TCP keeps the order of what it carries",
     ),
     Skipped("power", "a machine that loses its power at once takes hardware"),
 )
@@ -26,22 +26,33 @@ NEVER_TRIED = (
 
 _HEAD = """# What happens when something fails
 
-Written by `abreast faults --out DIR`: every fault is put into a live run (or into daemons that were started by hand)
-with two robots that keep their last command for ever, as a TurtleBot3 does. A judge outside, which shares nothing with
-abreast but the wire, takes what their drivers are told.
+Written by `abreast faults --out DIR`: every fault is put into a live run, or into daemons that were started by
+hand, with two robots that keep their last command for ever, as a TurtleBot3 does. A judge outside, which shares
+nothing with abreast but the wire, takes what their drivers are told.
 
-- `runaway_s`: from the reason to when the last command that moves a robot is no longer its driver's. The reason is the
-  fault for the robot that it deprives; for all others it is the stop that the supervisor says when it has noticed.
-  It may be {limit:g} s at most.
+- `runaway_s`: from the reason to when the last command that moves a robot is no longer its driver's. The reason
+  is the fault for the robot that it deprives; for all others it is the stop that the supervisor says when it has
+  noticed. It may be {limit:g} s at most.
 - `runaway_m`: the way rolled from the reason to standstill, the lag of the wheels included.
 - `oldest`: the oldest command, by its stamp, that moved a robot.
-- `lost`: logs that are gone or cannot be read; `exit`, `reason`: ends with another exit code, or without the words that
-  name the fault; `hang`: processes that do not end; `left`: processes of the run that outlive it. All are to be 0.
+- `lost`: logs that are gone or cannot be read; `exit`, `reason`: ends with another exit code, or without the
+  words that name the fault; `hang`: processes that do not end; `left`: processes of the run that outlive it. All
+  are to be 0.
 - `memory`: the largest process.
 
 """
-_COLUMNS = (
-    "| fault | tries | runaway_s | runaway_m | oldest s | lost | exit | reason | hang | left | memory MB |"
+_HEADS = (
+    "fault",
+    "tries",
+    "runaway_s",
+    "runaway_m",
+    "oldest",
+    "lost",
+    "exit",
+    "reason",
+    "hang",
+    "left",
+    "memory",
 )
 
 
@@ -64,12 +75,14 @@ def as_markdown(cases: Sequence[Case], skipped: Sequence[Skipped]) -> str:
     tries = sum(case.tries for case in covered)
     worst = max((case.worst.runaway_s for case in covered), default=0.0)
     text = _HEAD.format(limit=LIMIT_S)
-    text += f"{len(covered)} faults, {tries} tries: {failed} beyond a limit; the longest runaway is {worst:.2f} s.\n\n"
+    text += f"{len(covered)} faults, {tries} tries: {failed} beyond a limit; the longest runaway is "
+    text += f"{worst:.2f} s.\n\n"
     text += _table(covered)
     uncovered = [case for case in cases if case.fault.uncovered]
     if uncovered:
         why = "; ".join(dict.fromkeys(case.fault.uncovered for case in uncovered))
-        text += f"\n## Not covered\n\n{why[0].upper()}{why[1:]} ([guard.md](guard.md#what-it-does-not-cover)).\n\n"
+        where = "[guard.md](guard.md#what-it-does-not-cover)"
+        text += f"\n## Not covered\n\n{why[0].upper()}{why[1:]} ({where}).\n\n"
         text += _table(uncovered)
     if skipped:
         text += "\n## Not tried\n\n"
@@ -79,7 +92,7 @@ def as_markdown(cases: Sequence[Case], skipped: Sequence[Skipped]) -> str:
 
 def _table(cases: Sequence[Case]) -> str:
     rows = "".join(f"{row_of(case)}\n" for case in cases)
-    return f"{_COLUMNS}\n|{' --- |' * _COLUMNS.count('| ')}\n{rows}"
+    return f"| {' | '.join(_HEADS)} |\n|{' --- |' * len(_HEADS)}\n{rows}"
 
 
 def row_of(case: Case) -> str:
