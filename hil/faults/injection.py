@@ -38,8 +38,8 @@ def inject(lab: Lab, act: Act) -> Reason:
             return _let_speak(lab, act)
         case SecondFollower():
             from_s = time.monotonic()
-            words = "follower", SCENARIO, "--connect", lab.link.router
-            lab.processes.start("second", "-m", "hil", *words)
+            second = "follower", SCENARIO, "--connect", lab.link.router
+            lab.processes.start("second", "-m", "hil", *second)
             lab.watch(_JOINS_S, lambda: not lab.is_running())
             return Reason(from_s)
         case FullDisk():

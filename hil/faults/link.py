@@ -20,7 +20,7 @@ class Link:
     """Where the lab's router listens, and what the follower's guard is started with.
 
     ``far``: where the guard finds the router; ``near``: where it listens for its driver; ``before``: what
-    goes before its command. ``become``: lets the link be as words say, of :mod:`hil.faults.relay` or ``pass``.
+    goes before its command. ``become``: lets the link be as words say, of :mod:`hil.faults.relay`.
     """
 
     router: str

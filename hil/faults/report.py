@@ -26,19 +26,19 @@ NEVER_TRIED = (
 
 _HEAD = """# What happens when something fails
 
-Written by `abreast faults --out DIR`: every fault is put into a live run, or into daemons that were started by
-hand, with two robots that keep their last command for ever, as a TurtleBot3 does. A judge outside, which shares
-nothing with abreast but the wire, takes what their drivers are told.
+Written by `abreast faults --out DIR`: every fault is put into a live run, or into daemons that were started
+by hand, with two robots that keep their last command for ever, as a TurtleBot3 does. A judge outside, which
+shares nothing with abreast but the wire, takes what their drivers are told.
 
-- `runaway_s`: from the reason to when the last command that moves a robot is no longer its driver's. The reason
-  is the fault for the robot that it deprives; for all others it is the stop that the supervisor says when it has
-  noticed. It may be {limit:g} s at most.
+- `runaway_s`: from the reason to when the last command that moves a robot is no longer its driver's. The
+  reason is the fault for the robot that it deprives; for all others it is the stop that the supervisor says
+  when it has noticed. It may be {limit:g} s at most.
 - `runaway_m`: the way rolled from the reason to standstill, the lag of the wheels included.
-- `oldest`: the oldest command, by its stamp, that moved a robot.
+- `oldest`: the age by its stamp [s] of the oldest command that moved a robot.
 - `lost`: logs that are gone or cannot be read; `exit`, `reason`: ends with another exit code, or without the
-  words that name the fault; `hang`: processes that do not end; `left`: processes of the run that outlive it. All
-  are to be 0.
-- `memory`: the largest process.
+  words that name the fault; `hang`: processes that do not end; `left`: processes of the run that outlive it.
+  All are to be 0.
+- `memory`: the largest process [MB].
 
 """
 _HEADS = (

@@ -65,7 +65,8 @@ def speak(kind: str, endpoint: str, seconds: float, hz: float) -> int:
             session.put(topic, said)
 
     begun, said = time.monotonic(), 0
-    print(repr(begun), flush=True)
+    sys.stdout.write(f"{begun!r}\n")
+    sys.stdout.flush()
     while (now := time.monotonic()) < begun + seconds or said == 0:
         if topic != topics.STOP:
             _STAMP.pack_into(payload, _STAMP_AT, *divmod(time.time_ns(), 1_000_000_000))
@@ -83,7 +84,7 @@ def main(arguments: Sequence[str]) -> None:
     """Be a stranger."""
     kind, endpoint, seconds = arguments[0], arguments[1], float(arguments[2])
     hz = float(arguments[3]) if len(arguments) > 3 else 50.0
-    print(speak(kind, endpoint, seconds, hz), flush=True)
+    sys.stdout.write(f"{speak(kind, endpoint, seconds, hz)}\n")
 
 
 if __name__ == "__main__":

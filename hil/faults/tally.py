@@ -31,16 +31,14 @@ class Case:
 
     def as_row(self) -> dict[str, Any]:
         """The case as JSON has it, with every number."""
-        figures = {each.name: getattr(self.worst, each.name) for each in fields(Try) if each.name != "wrong"}
-        rounded = {
-            name: round(value, 4) if isinstance(value, float) else value for name, value in figures.items()
-        }
+        names = [each.name for each in fields(Try) if each.name != "wrong"]
+        figures = {name: getattr(self.worst, name) for name in names}
         return {
             "fault": self.fault.name,
             "role": self.fault.role,
             "mode": self.fault.mode,
             "tries": self.tries,
-            **rounded,
+            **{name: round(each, 4) if isinstance(each, float) else each for name, each in figures.items()},
         }
 
 
