@@ -34,7 +34,8 @@ def command(only: tuple[str, ...], tries: int, as_list: bool, as_json: bool, out
 
     The robots are emulated, keep their last command for ever, and are judged from outside. A try takes some
     15 seconds. Link faults and a full disk take root. Ends with 1 where a robot is told to move for longer
-    than 0.3 s after its reason, or anything is lost, hangs, is left, or ends for another reason than the fault.
+    than 0.3 s after its reason, or anything is lost, hangs, is left, or ends for another reason than its
+    fault.
     """
     from hil.faults.matrix import faults
 

@@ -124,8 +124,9 @@ def _cut(cut_s: float) -> Expected:
 def _strangers() -> Iterator[Fault]:
     setting = Setting(duration_s=15.0)
     after = Expected(_NOTICED, words=("second sender",))
-    for kind, hz in (("forged-wanted", 1.0), ("forged-told", 1.0), ("second-controller", 50.0)):
-        yield Fault(kind, "stranger", kind, setting, Stranger(kind, 2.0, hz), after)
+    # Once: past the guard each command is a fault of its own.
+    for kind, for_s in (("forged-wanted", 0.0), ("forged-told", 0.0), ("second-controller", 2.0)):
+        yield Fault(kind, "stranger", kind, setting, Stranger(kind, for_s, 50.0), after)
     stopped = Expected(_BOTH, words=("a stranger says so",))
     yield Fault("stranger-stop", "stranger", "stop", setting, Stranger("stop", 0.0, 1.0), stopped)
     second = Expected(_STOPPED, words=("second sender", "sends commands as well"))
