@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING
 
 import click
@@ -58,6 +60,12 @@ def _try_all(chosen: list[Fault], tries: int, *, as_json: bool, out: Path | None
     from hil.log.report_json import write_json
     from hil.log.written_aside import write_text_aside
 
+    def leave(_number: int, _frame: FrameType | None) -> None:
+        # Else what was started and mounted would stay.
+        raise KeyboardInterrupt
+
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, leave)
     cases, skipped = tried(chosen, tries, lambda line: click.echo(line, err=True))
     result, page = as_result(cases, skipped), as_markdown(cases, skipped)
     if out is not None:

@@ -147,7 +147,7 @@ def _clocks() -> Iterator[Fault]:
     for off_s in (-0.1, 0.1, -3600.0, 3600.0):
         # A tenth behind is within what a command may be old; its sender is asked for the time all the same.
         setting = Setting(how="hand", clock_s=off_s, drives=False)
-        after = Expected({"follower": "fault"}, words=("clock",))
+        after = Expected({"follower": "fault"}, words=("sender's clock is",))
         yield Fault(f"clock-{off_s:+g}s", "follower", "clock", setting, Nothing(12.0), after)
     jump = ("--set", "mocap.clock_jump_s=10.0", "--set", "mocap.clock_jump_at_s=3.0")
     setting = Setting(how="emulated", duration_s=_SHORT, options=jump)
@@ -171,7 +171,7 @@ def _sensors() -> Iterator[Fault]:
 
 
 def _machine() -> Iterator[Fault]:
-    full = Expected(_STOPPED, words=("space", "full"))
+    full = Expected(_STOPPED, words=("free on", "No space", "disk"))
     setting = Setting(disk_mb=24, duration_s=15.0)
     yield Fault("full-disk", "recorder", "full-disk", setting, FullDisk(), full)
     starved = Expected(_STOPPED, codes=(0, 1))

@@ -23,7 +23,8 @@ def tried(
         for number, fault in enumerate(faults, start=1):
             begun_s = time.monotonic()
             try:
-                done = [attempt(fault, Path(name) / f"{fault.name}-{turn}") for turn in range(tries)]
+                # By numbers: a fault's own name in a path is not to pass for the word that names it.
+                done = [attempt(fault, Path(name) / f"{number}-{turn}") for turn in range(tries)]
             except NotHereError as error:
                 skipped.append(Skipped(fault.name, str(error)))
                 say(f"{number}/{len(faults)} {fault.name}: skipped, {error}")
