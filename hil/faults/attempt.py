@@ -14,7 +14,7 @@ from hil.faults.processes import pids_with
 from hil.log.reader import read_log
 from hil.log.recovery import recover
 
-_SETTLES_S, _AFTER_S, _ENDS_S, _LEAVES_S = 1.0, 1.5, 60.0, 20.0
+_SETTLES_S, _AFTER_S, _ENDS_S, _LEAVES_S = 1.0, 1.5, 120.0, 20.0
 _BY_US = ("observer", "guard-leader", "guard-follower", "relay", "stranger", "second")
 """Processes of a try that are no part of what is tried."""
 
