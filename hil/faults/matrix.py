@@ -89,7 +89,8 @@ def _by_run(role: str, mode: str) -> Expected:
 def _by_hand(role: str, mode: str) -> Expected:
     """By hand, where guards alone make robots stand."""
     ended = {"kill": -signal.SIGKILL}.get(mode, 0)
-    words = ("latched (",) if role not in ("recorder", "estimator") else ()
+    silent = role in ("recorder", "estimator") or (role, mode) == ("guard", "kill")
+    words = () if silent else ("latched (",)
     if role == "estimator":
         # Whose controller stays alive stands for want of estimates, and may go on when they come.
         return Expected(_OWN[role], for_good=mode != "stop", codes=(ended,))
