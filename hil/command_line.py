@@ -35,6 +35,7 @@ COMMANDS = {
     "leader": "what drives a real leader by its program, as a daemon",
     "recorder": "the recorder, as a daemon",
     "router": "the router that all others connect to, on its own, as a daemon",
+    "faults": "faults put into live runs on purpose, and whether robots stand for them",
     "secure": "keys by which a router knows who is who, and what each may do",
     "bridge": "motion captures of others brought to the wire, as a daemon",
 }

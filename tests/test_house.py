@@ -34,7 +34,8 @@ ROOMS = {
     ),
     "hil": (
         "extensions", "scenario", "wire", "guard", "log", "nodes", "emulator", "lockstep", "live", "bridge",
-        "doctor", "replay", "recordings", "judge", "figures", "reports", "sweep", "simulate", "commands",
+        "doctor", "replay", "recordings", "judge", "figures", "reports", "sweep", "simulate",
+        "faults", "commands",
     ),
 }  # fmt: skip
 """Rooms of the packages that have some, lower ones first: each may import those before it."""

@@ -87,23 +87,6 @@ class Run:
         with self.listening(topics.DIAGNOSTICS) as wire:
             self.wait_until(look)
 
-    def wait_until_refused(self, node: str, counts: dict[str, int]) -> None:
-        """Wait until a node reports that it has refused so many inputs, by cause."""
-
-        def look() -> bool:
-            while (event := wire.inbox.take(0.0)) is not None:
-                for status in decode_as(event.payload, msg.DiagnosticArray).status:
-                    if status.name == f"abreast/{node}":
-                        values = {each.key: each.value for each in status.values}
-                        if all(
-                            values.get(f"refused.{cause}") == str(count) for cause, count in counts.items()
-                        ):
-                            return True
-            return False
-
-        with self.listening(topics.DIAGNOSTICS) as wire:
-            self.wait_until(look)
-
     @contextmanager
     def listening(self, *names: str) -> Iterator[Wire]:
         """A wire of our own to the run's router, with an inbox of these topics."""

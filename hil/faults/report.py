@@ -1,0 +1,111 @@
+"""What the tries came to: JSON, and a page in Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from hil.faults.tally import COUNTS, LIMIT_S, Case
+
+
+class Skipped(NamedTuple):
+    """A fault that could not be tried here, and why."""
+
+    fault: str
+    why: str
+
+
+NEVER_TRIED = (
+    Skipped(
+        "reorder",
+        "TCP keeps the order of what it carries",
+    ),
+    Skipped("power", "a machine that loses its power at once takes hardware"),
+)
+"""What no machine tries."""
+
+_HEAD = """# What happens when something fails
+
+Written by `abreast faults --out DIR`: every fault is put into a live run, or into daemons that were started
+by hand, with two robots that keep their last command for ever, as a TurtleBot3 does. A judge outside, which
+shares nothing with abreast but the wire, takes what their drivers are told.
+
+- `runaway_s`: from the reason to when the last command that moves a robot is no longer its driver's. The
+  reason is the fault for the robot that it deprives; for all others it is the stop that the supervisor says
+  when it has noticed. It may be {limit:g} s at most.
+- `runaway_m`: the way rolled from the reason to standstill, the lag of the wheels included.
+- `oldest`: the age by its stamp [s] of the oldest command that moved a robot.
+- `lost`: logs that are gone or cannot be read; `exit`, `reason`: ends with another exit code, or without the
+  words that name the fault; `hang`: processes that do not end; `left`: processes of the run that outlive it.
+  All are to be 0.
+- `memory`: the largest process [MB].
+
+"""
+_HEADS = (
+    "fault",
+    "tries",
+    "runaway_s",
+    "runaway_m",
+    "oldest",
+    "lost",
+    "exit",
+    "reason",
+    "hang",
+    "left",
+    "memory",
+)
+
+
+def as_result(cases: Sequence[Case], skipped: Sequence[Skipped]) -> dict[str, Any]:
+    """The result as JSON has it; what is not covered stands apart, with what was measured of it."""
+    return {
+        "limit_s": LIMIT_S,
+        "cases": [case.as_row() for case in cases if not case.fault.uncovered],
+        "not_covered": [
+            {**case.as_row(), "why": case.fault.uncovered} for case in cases if case.fault.uncovered
+        ],
+        "skipped": [each._asdict() for each in skipped],
+    }
+
+
+def as_markdown(cases: Sequence[Case], skipped: Sequence[Skipped]) -> str:
+    """The page."""
+    covered = [case for case in cases if not case.fault.uncovered]
+    failed = sum(case.failed for case in covered)
+    tries = sum(case.tries for case in covered)
+    worst = max((case.worst.runaway_s for case in covered), default=0.0)
+    text = _HEAD.format(limit=LIMIT_S)
+    text += f"{len(covered)} faults, {tries} tries: {failed} beyond a limit; the longest runaway is "
+    text += f"{worst:.2f} s.\n\n"
+    text += _table(covered)
+    uncovered = [case for case in cases if case.fault.uncovered]
+    if uncovered:
+        why = "; ".join(dict.fromkeys(case.fault.uncovered for case in uncovered))
+        where = "[guard.md](guard.md#what-it-does-not-cover)"
+        text += f"\n## Not covered\n\n{why[0].upper()}{why[1:]} ({where}).\n\n"
+        text += _table(uncovered)
+    if skipped:
+        text += "\n## Not tried\n\n"
+        text += "".join(f"- `{each.fault}`: {each.why}\n" for each in skipped)
+    return text
+
+
+def _table(cases: Sequence[Case]) -> str:
+    rows = "".join(f"{row_of(case)}\n" for case in cases)
+    return f"| {' | '.join(_HEADS)} |\n|{' --- |' * len(_HEADS)}\n{rows}"
+
+
+def row_of(case: Case) -> str:
+    """A case as a row of a table."""
+    worst = case.worst
+    counts = [str(getattr(worst, name)) for name in COUNTS]
+    cells = [
+        f"`{case.fault.name}`",
+        str(case.tries),
+        f"{worst.runaway_s:.2f}",
+        f"{worst.runaway_m:.3f}",
+        f"{worst.oldest_command_s:.3f}",
+        *counts,
+        f"{worst.memory_mb:.0f}",
+    ]
+    return f"| {' | '.join(cells)} |"

@@ -1,0 +1,43 @@
+"""A handful of faults in live runs, by the command itself."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HANDFUL = ("kill-follower-run", "stop-follower-run", "cut-1s-relay", "second-controller")
+
+
+def faults(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "hil", "faults", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=900.0)
+
+
+@pytest.mark.slow
+def test_a_handful_of_faults_does_not_let_a_robot_go(tmp_path: Path) -> None:
+    chosen = [word for name in HANDFUL for word in ("--only", name)]
+    done = faults(*chosen, "--json", "--out", str(tmp_path))
+    result = json.loads(done.stdout)
+    assert done.returncode == 0, done.stderr
+    assert {case["fault"] for case in result["cases"]} == set(HANDFUL)
+    # A robot that did not drive would be told nothing for long as well.
+    assert all(case["oldest_command_s"] > 0.0 for case in result["cases"])
+    assert result == json.loads((tmp_path / "faults.json").read_text(encoding="utf-8"))
+    assert "kill-follower-run" in (tmp_path / "reliability.md").read_text(encoding="utf-8")
+
+
+def test_a_fault_that_is_none_is_said() -> None:
+    done = faults("--only", "gremlins")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "gremlins" in done.stderr
+    assert "--list" in done.stderr
+
+
+def test_all_names_are_listed() -> None:
+    done = faults("--list")
+    assert done.returncode == 0
+    assert set(HANDFUL) <= set(done.stdout.split())
