@@ -6,6 +6,7 @@ newest, and may be held up by whatever carries it.
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable
@@ -74,16 +75,24 @@ class RobotShell:
             sender = self.guard.sender
             self.guard.clock_s = self._clock.ahead_s(sender.session) if sender is not None else None
             problem, values = problem_of(self.guard, now), values_of(self.guard, now)
-        if self.is_stuck():
+        if not self.decides():
+            problem = "the guard has broken down, and makes its robot stand"
+        elif self.is_stuck():
             problem = f"the driver has taken a command for more than {STUCK_S:g} s; see what holds it up"
         values["driver_failures"] = self.failures
         if self._clock.heard and sender is not None:
             values["clock_ms"] = f"{1e3 * self._clock.seen_s:.1f}"
         report = diagnostics_bytes(node_of(self._order.robot), now.host_ns, problem, values)
-        self._reports.put(report)
-        if sender is not None:
-            self._clock.ask(sender.session)
+        with contextlib.suppress(zenoh.ZError):
+            # A session that fails costs a report, never the guard.
+            self._reports.put(report)
+            if sender is not None:
+                self._clock.ask(sender.session)
         return problem
+
+    def decides(self) -> bool:
+        """Whether both threads are alive: without them the driver would keep its last command."""
+        return all(thread.is_alive() for thread in self._threads)
 
     def is_stuck(self) -> bool:
         """Whether the driver does not take what it is told."""

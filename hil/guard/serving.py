@@ -11,6 +11,7 @@ from types import FrameType
 
 import zenoh
 
+from hil.errors import CheckFailedError
 from hil.guard.driver import Driver, WireDriver
 from hil.guard.order import GuardOrder
 from hil.guard.report import REPORT_NS
@@ -56,19 +57,24 @@ def _guard(
     session: zenoh.Session, order: GuardOrder, driver: Driver, ended: threading.Event, duration_s: float
 ) -> None:
     shell = RobotShell(session, order, driver)
-    _say(f"ready, guards {order.robot}")
-    sd_notify("READY=1")
-    until, said = time.monotonic() + duration_s, ""
-    while not ended.wait(_REPORT_S) and time.monotonic() < until:
-        problem = shell.report()
-        if problem != said:
-            _say(problem or "well again")
-            sd_notify(f"STATUS={problem or 'well'}")
-            said = problem
-        if not shell.is_stuck():
-            sd_notify("WATCHDOG=1")
-    sd_notify("STOPPING=1")
-    shell.close()
+    try:
+        _say(f"ready, guards {order.robot}")
+        sd_notify("READY=1")
+        until, said = time.monotonic() + duration_s, ""
+        while not ended.wait(_REPORT_S) and time.monotonic() < until:
+            problem = shell.report()
+            if problem != said:
+                _say(problem or "well again")
+                sd_notify(f"STATUS={problem or 'well'}")
+                said = problem
+            if not shell.decides():
+                raise CheckFailedError(problem)
+            if not shell.is_stuck():
+                sd_notify("WATCHDOG=1")
+    finally:
+        # However it ends, the driver is told to stand.
+        sd_notify("STOPPING=1")
+        shell.close()
 
 
 def _say(line: str) -> None:
