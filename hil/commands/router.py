@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
-from hil.commands.wire_options import DEFAULT_ENDPOINT, SECURE, SECURE_ENDPOINT
+from hil.commands.wire_options import SECURE
 from hil.errors import UsageError
+from hil.wire.endpoints import DEFAULT_ENDPOINT, SECURE_ENDPOINT
 
 _LONGEST_WAIT_S = 0.2
 

@@ -15,7 +15,6 @@ from hil.commands.guard_option import NO_GUARD
 from hil.commands.outputs import OutputFolder, new_folder
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION, Seconds
-from hil.commands.wire_options import DEFAULT_ENDPOINT, SECURE_ENDPOINT
 from hil.errors import AbreastError, CheckFailedError, InterruptedRunError, UsageError
 from hil.judge.made_by import law_failure
 from hil.live.crew import Crew
@@ -26,6 +25,7 @@ from hil.scenario.files import load_scenario, refuse_unrunnable
 from hil.scenario.guarded import with_guards
 from hil.scenario.links import chain_of, links_of, refuse_chain
 from hil.scenario.schema import Scenario
+from hil.wire.endpoints import DEFAULT_ENDPOINT, SECURE_ENDPOINT
 
 if TYPE_CHECKING:
     from hil.live.run import Outcome

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from hil.wire.endpoints import DEFAULT_ENDPOINT, SECURE_ENDPOINT
+
 if TYPE_CHECKING:
     from hil.wire.session import Endpoints
 
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-SECURE_ENDPOINT = "tls/127.0.0.1:7447"
 
 SECURE = click.Option(
     ["--secure"],

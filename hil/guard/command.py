@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hil.errors import AbreastError
-
-DEFAULT_ENDPOINT, SECURE_ENDPOINT = "tcp/127.0.0.1:7447", "tls/127.0.0.1:7447"
+from hil.wire.endpoints import DEFAULT_ENDPOINT, SECURE_ENDPOINT
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -17,9 +17,11 @@ from hil.guard.order import GuardOrder
 from hil.guard.report import REPORT_NS
 from hil.guard.robot_shell import RobotShell
 from hil.guard.sd_notify import sd_notify
-from hil.wire.session import Endpoints, close_session, open_session
+from hil.wire.session import Endpoints, GaveUpError, close_session, open_session
 
 _REPORT_S = REPORT_NS * 1e-9
+_SILENT_S = 2.0
+"""After so long [s] it says that it waits."""
 
 
 def serve(
@@ -38,7 +40,15 @@ def serve(
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, end)
-    session = open_session(endpoints, patience=math.inf, give_up=ended.is_set)
+    waiting = threading.Timer(_SILENT_S, _say, [f"waits for {endpoints.describe()}; is the router up?"])
+    waiting.daemon = True
+    waiting.start()
+    try:
+        session = open_session(endpoints, patience=math.inf, give_up=ended.is_set)
+    except GaveUpError:
+        return
+    finally:
+        waiting.cancel()
     try:
         _guard(session, order, _driver(session, order, ros), ended, duration_s)
     finally:

@@ -31,7 +31,8 @@ def ahead_of_us(asked_ns: int, told_ns: int, heard_ns: int) -> tuple[float, floa
     >>> ahead_of_us(0, 60_000_000, 20_000_000)
     (0.05, 0.01)
     """
-    return (told_ns - 0.5 * (asked_ns + heard_ns)) * _NS, 0.5 * (heard_ns - asked_ns) * _NS
+    way_ns = heard_ns - asked_ns
+    return (told_ns - asked_ns - 0.5 * way_ns) * _NS, 0.5 * way_ns * _NS
 
 
 class ClockQuery:

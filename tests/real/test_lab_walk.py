@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
-from hil.commands.wire_options import DEFAULT_ENDPOINT
 from hil.scenario.files import load_scenario
 from hil.wire import message_types as msg
+from hil.wire.endpoints import DEFAULT_ENDPOINT
 from hil.wire.messages import decode_as
 from hil.wire.pubsub import Wire
 from hil.wire.session import Endpoints, close_session, open_session
