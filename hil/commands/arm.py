@@ -58,7 +58,7 @@ def command(
         _hear(wire, guards)
     if not guards.held:
         whom = f"of {robot}" if robot else "of any robot"
-        raise CheckFailedError(f"abreast arm: no guard {whom} was heard; start abreast guard on the robot")
+        raise CheckFailedError(f"no guard {whom} was heard; start abreast guard on the robot")
     for name, text in guards.held.items():
         if text and robot in ("", name):
             click.echo(f"abreast arm: {name}: {text}", err=True)

@@ -149,7 +149,7 @@ def _how(
     option = next((each for each, given in apart_from_one.items() if given), "")
     if lockstep and option:
         raise UsageError(
-            f"{option}: a run in lockstep is one process; leave one of {option} and --lockstep out"
+            f"{option}: a run in lockstep is one process without a wire; leave {option} or --lockstep out"
         )
     leads = "--leader" if driven_by is not None else "--countdown" if countdown is not None else ""
     if (leads or emulate is not None) and not real:

@@ -50,9 +50,7 @@ def init(
     try:
         from hil.live.tls_keys import Deployment, make_keys
     except ModuleNotFoundError as error:
-        raise UsageError(
-            f"abreast secure: {error.name} is not installed; pip install 'abreast[secure]'"
-        ) from None
+        raise UsageError(f"secure: {error.name} is not installed; pip install 'abreast[secure]'") from None
     chosen = with_guards(load_scenario(scenario, overrides), present=not no_guard)
     now = datetime.datetime.now(datetime.UTC)
     wanted = Deployment(chosen, hosts, days)
