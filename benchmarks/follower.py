@@ -44,6 +44,7 @@ from hil.wire.messages import decode_as, encode, to_ns
 from hil.wire.pubsub import Wire
 from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
 from hil.wire.topics import topics_of, urgent_topics
+from hil.wire.undeclare import undeclare
 
 PAIR, CHAIN = "turtlebot3", "chain5-turtlebot3"
 TRIPS = {"null": (), "follower": ("follower",), "apart": ("controller", "estimator")}
@@ -105,7 +106,7 @@ def serve_null(endpoint: str, hear: str, say: str, size: int) -> None:
     try:
         threading.Event().wait()
     finally:
-        subscriber.undeclare()  # type: ignore[no-untyped-call]
+        undeclare(subscriber)
         close_session(session)
 
 
@@ -158,7 +159,7 @@ class Lab:
         return encode(frame_message(now_ns, number, bodies))
 
     def close(self) -> None:
-        self._ear.undeclare()  # type: ignore[no-untyped-call]
+        undeclare(self._ear)
         self.wire.close()
         close_session(self.session)
 
@@ -227,7 +228,7 @@ class Ear:
         self.heard.clear()
 
     def close(self) -> None:
-        self._subscriber.undeclare()  # type: ignore[no-untyped-call]
+        undeclare(self._subscriber)
         close_session(self.session)
 
 

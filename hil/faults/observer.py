@@ -26,6 +26,7 @@ from hil.wire import topics
 from hil.wire.messages import decode_as, encode, header, to_ns
 from hil.wire.pubsub import Wire
 from hil.wire.session import Endpoints, close_session, open_session
+from hil.wire.undeclare import undeclare
 
 FRAME_S, EVERY = 1.0 / 120.0, 6
 """From frame to frame [s], and of so many frames one with odometry."""
@@ -74,8 +75,7 @@ class Ear:
 
     def close(self) -> None:
         """Leave the wire."""
-        for subscriber in self._subscribers:
-            subscriber.undeclare()  # type: ignore[no-untyped-call]
+        undeclare(*self._subscribers)
         self.wire.close()
         close_session(self._session)
 

@@ -10,6 +10,7 @@ import zenoh
 from formation.pose import Motion
 from hil.guard.order import GuardOrder
 from hil.wire.outlet import Outlet, gid_of
+from hil.wire.undeclare import undeclare
 
 _STAMP_AT, _TURN_AFTER = 4, 40
 _NS_PER_S = 1_000_000_000
@@ -56,4 +57,4 @@ class WireDriver:
 
     def close(self) -> None:
         """Take the publisher back."""
-        self._outlet.publisher.undeclare()  # type: ignore[no-untyped-call]
+        undeclare(self._outlet.publisher)

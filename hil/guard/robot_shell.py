@@ -23,6 +23,7 @@ from hil.guard.robot_guard import LOOK_S, Now, RobotGuard, Told
 from hil.wire.body_walk import spots_in
 from hil.wire.clock_query import ClockQuery
 from hil.wire.outlet import Outlet, gid_of, origin_of, sender_of
+from hil.wire.undeclare import undeclare
 
 STUCK_S = 0.5
 """A driver that takes a command for longer than this [s] is stuck."""
@@ -113,10 +114,8 @@ class RobotShell:
             for _ in range(_PARTING):
                 self._tell(STANDSTILL)
         self.report()
-        for token in self._tokens:
-            token.undeclare()  # type: ignore[no-untyped-call]
-        for subscriber in self._subscribers:
-            subscriber.undeclare()  # type: ignore[no-untyped-call]
+        undeclare(*self._tokens)
+        undeclare(*self._subscribers)
         self._driver.close()
 
     def _on_wanted(self, sample: zenoh.Sample) -> None:

@@ -25,6 +25,7 @@ from hil.wire.key_layout import OURS, KeyLayout
 from hil.wire.messages import MalformedPayloadError, decode_as, to_ns
 from hil.wire.outlet import origin_of, sender_of
 from hil.wire.topics import Topics
+from hil.wire.undeclare import undeclare
 
 M = TypeVar("M", bound=msg.Message)
 
@@ -184,9 +185,8 @@ class RunMonitor:
 
     def close(self) -> None:
         """End the subscriptions."""
-        self._diagnostics.undeclare()  # type: ignore[no-untyped-call]
-        for newest in self._newest.values():
-            newest.undeclare()  # type: ignore[no-untyped-call]
+        undeclare(self._diagnostics)
+        undeclare(*self._newest.values())
         self._newest.clear()
 
     def _on_diagnostics(self, sample: zenoh.Sample) -> None:

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 
 import zenoh
 
+from hil.wire.undeclare import undeclare
+
 Say = Callable[[str], None]
 
 
@@ -29,4 +31,4 @@ def links_said(session: zenoh.Session, say: Say) -> Iterator[None]:
         yield
     finally:
         # A session does not close while one listens.
-        listener.undeclare()  # type: ignore[no-untyped-call]
+        undeclare(listener)

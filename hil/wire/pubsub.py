@@ -22,6 +22,7 @@ from hil.wire.ros_tokens import Endpoint, all_tokens, endpoint_in, endpoint_toke
 from hil.wire.router_clients import RouterClients
 from hil.wire.session import Endpoints, allowed_keys, close_session, open_session
 from hil.wire.topics import ARM, STOP, urgent_topics
+from hil.wire.undeclare import undeclare
 
 INBOX_LIMIT, INBOX_BYTES = 100_000, 1 << 28
 """Payloads kept waiting at most; more than this is dropped and counted, so that memory stays bounded."""
@@ -165,12 +166,9 @@ class Wire:
 
     def close(self) -> None:
         """Take back all declarations; needed before the session is closed."""
-        for token in self._tokens:
-            token.undeclare()  # type: ignore[no-untyped-call]
-        for subscriber in self._subscribers:
-            subscriber.undeclare()  # type: ignore[no-untyped-call]
-        for outlet in self._outlets.values():
-            outlet.publisher.undeclare()  # type: ignore[no-untyped-call]
+        undeclare(*self._tokens)
+        undeclare(*self._subscribers)
+        undeclare(*(outlet.publisher for outlet in self._outlets.values()))
         self._tokens.clear()
         self._subscribers.clear()
         self._outlets.clear()
@@ -241,6 +239,6 @@ def joined(
     try:
         yield wire
     finally:
-        clock.undeclare()  # type: ignore[no-untyped-call]
+        undeclare(clock)
         wire.close()
         close_session(session)

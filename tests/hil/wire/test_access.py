@@ -21,6 +21,7 @@ from hil.wire.roles import ROLES, ROUTER, Role
 from hil.wire.session import Endpoints, NoRouterError, close_session, open_session, reserved_endpoint
 from hil.wire.session_config import keys_config
 from hil.wire.topics import DIAGNOSTICS, RIGID_BODIES, STOP
+from hil.wire.undeclare import undeclare
 from tests.tls_labs import PATIENCE, TlsLab, lab_keys, tls_lab
 
 TURTLEBOT3 = with_guards(load_scenario("turtlebot3"))
@@ -138,8 +139,7 @@ def test_a_viewer_reaches_nobody_by_puts_deletes_and_wildcards(plain: TlsLab, mo
         guard.publish("follower/cmd_vel", b"good")
         time.sleep(0.02)
     assert set(heard) == {"follower/cmd_vel"}
-    for subscriber in subscribers:
-        subscriber.undeclare()  # type: ignore[no-untyped-call]
+    undeclare(*subscribers)
 
 
 def test_a_controllers_wildcard_does_not_reach_further_than_the_controller(plain: TlsLab) -> None:
@@ -215,7 +215,7 @@ def test_a_viewer_does_not_pass_for_a_robot_that_listens(plain: TlsLab) -> None:
             time.sleep(0.02)
         time.sleep(SILENCE_S)
         assert [(each.key, each.publishes) for each in operator.graph()] == [("follower/cmd_vel", False)]
-        held.undeclare()  # type: ignore[no-untyped-call]
+        undeclare(held)
 
 
 @pytest.mark.parametrize("name", ["turtlebot3", "chain5"])

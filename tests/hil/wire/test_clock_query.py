@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from hil.wire.clock_query import ClockQuery, ahead_of_us, tell_time
 from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
+from hil.wire.undeclare import undeclare
 
 NS = st.integers(0, 10**9)
 
@@ -36,6 +37,6 @@ def test_a_session_tells_its_time_and_one_that_does_not_is_not_known() -> None:
         assert query.ahead_s("somebody") is None
         query.ask("somebody")
         assert query.ahead_s(who) is None
-        clock.undeclare()  # type: ignore[no-untyped-call]
+        undeclare(clock)
         for session in (other, router):
             close_session(session)
