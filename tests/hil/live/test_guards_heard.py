@@ -1,0 +1,23 @@
+"""What guards say of their robots, as whoever arms them hears it."""
+
+from __future__ import annotations
+
+from hil.guard.diagnostics_bytes import diagnostics_bytes
+from hil.live.guards_heard import GuardsHeard
+
+
+def test_a_guard_is_armed_when_it_says_that_it_holds_nothing() -> None:
+    guards = GuardsHeard()
+    assert not guards.are_armed("")
+    guards.hear(b"nonsense")
+    guards.hear(diagnostics_bytes("controller", 1, "", {"latched": "stopped"}))
+    assert guards.held == {}
+    guards.hear(diagnostics_bytes("guard/leader", 1, "", {"latched": ""}))
+    guards.hear(diagnostics_bytes("guard/follower", 1, "latched (stopped): enough", {"latched": "stopped"}))
+    assert guards.held == {"leader": "", "follower": "latched (stopped): enough"}
+    assert guards.are_armed("leader")
+    assert not guards.are_armed("follower")
+    assert not guards.are_armed("")
+    assert not guards.are_armed("agent3")
+    guards.hear(diagnostics_bytes("guard/follower", 2, "", {"latched": ""}))
+    assert guards.are_armed("")
