@@ -1,5 +1,6 @@
 """TurtleBot3 as ROS 2 has them, in a process of their own: rclpy and nothing of ours.
 
+"ready" is printed when they are there, "met" when the graph knows who hears and who commands each of them.
 Odometry comes at 20 Hz. Commands are cut to whole steps by ``int(100 v)``, answered with a first-order lag,
 and kept for ever: there is no timeout. `rclpy_robots.py CONFIG`, where CONFIG is JSON:
 
@@ -52,6 +53,12 @@ class Robot:
         if given.get("listens", True):
             self.node.create_subscription(kind, "cmd_vel", self._on_command, QoSProfile(depth=10))
         self._odometry = self.node.create_publisher(Odometry, "odom", QoSProfile(depth=10))
+        self._commands = f"/{namespace}/cmd_vel" if namespace else "/cmd_vel"
+
+    def is_met(self) -> bool:
+        """Whether somebody listens to its odometry and somebody sends it commands, as the graph knows."""
+        heard = self._odometry.get_subscription_count() > 0
+        return heard and self.node.count_publishers(self._commands) > 0
 
     def _on_command(self, message: Any) -> None:
         twist = message.twist if hasattr(message, "twist") else message
@@ -101,6 +108,7 @@ def main() -> None:
     captured = 0
     rows: list[list[float]] = []
     print("ready", flush=True)
+    are_met = False
     while time.time() - began < given["duration_s"]:
         until = began + (captured + 1) / CAPTURES_HZ
         while (left := until - time.time()) > 0.0:
@@ -117,6 +125,9 @@ def main() -> None:
         poses = [number for robot in robots for number in robot.pose]
         mocap.sendto(struct.pack(f"<d{len(poses)}d", now, *poses), ("127.0.0.1", given["poses_to"]))
         rows.append([now, *poses, *robots[0].speed])
+        if not are_met and all(robot.is_met() for robot in robots):
+            are_met = True
+            print("met", flush=True)
         if now >= told + ODOMETRY_S:
             told += ODOMETRY_S
             for robot in robots:

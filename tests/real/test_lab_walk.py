@@ -68,9 +68,9 @@ def done(command: list[str], code: int = 0) -> subprocess.CompletedProcess[str]:
 
 @contextmanager
 def placed(lab: Lab, poses_to: int, peers: Path) -> Iterator[Peer]:
-    """Both robots, put where a run begins and switched on."""
+    """Both robots, put where a run begins, switched on, and in the graph."""
     with peer("robots", [str(HERE / "rclpy_robots.py"), lab.robots(poses_to)], peers) as robots:
-        robots.wait_for("ready")
+        robots.wait_for("met")
         yield robots
 
 
