@@ -57,8 +57,9 @@ class Robot:
 
     def is_met(self) -> bool:
         """Whether somebody listens to its odometry and somebody sends it commands, as the graph knows."""
-        heard = self._odometry.get_subscription_count() > 0
-        return heard and self.node.count_publishers(self._commands) > 0
+        heard: int = self._odometry.get_subscription_count()
+        told: int = self.node.count_publishers(self._commands)
+        return heard > 0 and told > 0
 
     def _on_command(self, message: Any) -> None:
         twist = message.twist if hasattr(message, "twist") else message
