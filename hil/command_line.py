@@ -36,6 +36,7 @@ COMMANDS = {
     "recorder": "the recorder, as a daemon",
     "router": "the router that all others connect to, on its own, as a daemon",
     "faults": "faults put into live runs on purpose, and whether robots stand for them",
+    "soak": "a long live run: whether memory stays flat, cycles on time, and its log repeats",
     "secure": "keys by which a router knows who is who, and what each may do",
     "bridge": "motion captures of others brought to the wire, as a daemon",
 }

@@ -35,7 +35,7 @@ ROOMS = {
     "hil": (
         "extensions", "scenario", "wire", "guard", "log", "nodes", "emulator", "lockstep", "live", "bridge",
         "doctor", "replay", "recordings", "judge", "figures", "reports", "sweep", "simulate",
-        "faults", "commands",
+        "faults", "soak", "commands",
     ),
 }  # fmt: skip
 """Rooms of the packages that have some, lower ones first: each may import those before it."""

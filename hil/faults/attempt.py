@@ -10,7 +10,7 @@ from hil.faults.fault import Fault, Nothing, SecondFollower, Signal
 from hil.faults.injection import inject
 from hil.faults.judgement import Reason, motion_of
 from hil.faults.lab import RUN, Lab, running_lab
-from hil.faults.processes import pids_with
+from hil.live.process_table import pids_with
 from hil.log.reader import read_log
 from hil.log.recovery import recover
 

@@ -11,7 +11,8 @@ from pathlib import Path
 from hil.faults.fault import Setting
 from hil.faults.link import Link, NotHereError, cabled, no_link, relayed
 from hil.faults.notes import Notes, read_lines
-from hil.faults.processes import Processes, pids_with
+from hil.faults.processes import Processes
+from hil.live.process_table import pids_with
 from hil.scenario.files import load_scenario, scenario_text
 from hil.scenario.guarded import with_guards
 from hil.scenario.start import start_poses

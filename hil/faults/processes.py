@@ -1,4 +1,4 @@
-"""Processes of a try: started by name, watched, and ended; and what the kernel tells of them."""
+"""Processes of a try: started by name, watched, and ended."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+
+from hil.live.process_table import memory_mb, pids_with
 
 _PATIENCE_S = 20.0
 
@@ -62,7 +64,7 @@ class Processes:
     def look(self) -> None:
         """Note how much memory the largest process of the try has taken."""
         for pid in pids_with(str(self._folder)):
-            self.memory_mb = max(self.memory_mb, _peak_mb(pid))
+            self.memory_mb = max(self.memory_mb, memory_mb(pid, peak=True))
 
     def close(self) -> None:
         """Kill whatever still runs."""
@@ -77,23 +79,3 @@ class Processes:
 
     def _words(self, name: str) -> Path:
         return self._folder / f"{name}.err"
-
-
-def pids_with(text: str) -> dict[int, list[str]]:
-    """Command lines of processes in one word of which a text stands, by their numbers."""
-    found = {}
-    for entry in Path("/proc").iterdir():
-        if not entry.name.isdecimal():
-            continue
-        with contextlib.suppress(OSError):
-            words = (entry / "cmdline").read_bytes().decode(errors="replace").split("\0")
-            if any(text in word for word in words):
-                found[int(entry.name)] = words
-    return found
-
-
-def _peak_mb(pid: int) -> float:
-    with contextlib.suppress(OSError, StopIteration, ValueError):
-        lines = Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines()
-        return float(next(line for line in lines if line.startswith("VmHWM")).split()[1]) / 1024.0
-    return 0.0

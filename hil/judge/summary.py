@@ -17,6 +17,7 @@ from hil.judge.certified import judge_certified
 from hil.judge.clock import arrival_rows, judge_clock
 from hil.judge.columns import Columns, columns_of
 from hil.judge.consistency import judged_findings
+from hil.judge.cycles import judge_cycles
 from hil.judge.estimation import judge_estimation
 from hil.judge.findings import findings_list
 from hil.judge.formation import judge_formation
@@ -75,6 +76,7 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         ),
         "formation": judge_formation(run_data, columns),
         "latency_ms": _latency(columns),
+        "cycles": _cycles(columns),
         "clock": judge_clock(arrival_rows(run_data)),
         "commands": _commands(columns),
         "orders_refused": refusal(given) if driven else None,
@@ -107,6 +109,12 @@ def _latency(columns: Columns) -> dict[str, dict[str, float]]:
         return {}
     waits_ms: FloatArray = np.asarray((commands.issued_ns - commands.capture_ns)[first] * 1e-6)
     return {"capture_to_command": {name: percentile(waits_ms, q) for name, q in PERCENTILES.items()}}
+
+
+def _cycles(columns: Columns) -> dict[str, Any]:
+    commands = columns.commands
+    first = commands.fresh & _in_run(columns)
+    return judge_cycles(commands.capture_ns[first], commands.issued_ns[first])
 
 
 def percentile(values: FloatArray, q: float) -> float:

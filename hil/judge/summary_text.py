@@ -173,6 +173,9 @@ def _wire_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
         text = (
             f"capture to command {latency['p50']:.1f} ms, p99 {latency['p99']:.1f}, max {latency['max']:.1f}"
         )
+        cycles = summary.get("cycles", {})
+        if cycles.get("late"):
+            text += f"; {cycles['late']} of {cycles['count']} later than {cycles['limit_ms']:.1f} ms"
         yield "latency", text, PLAIN
     yield from _clock_lines(summary)
 

@@ -70,6 +70,7 @@ def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
         "commands": {"sent", "saturated", "stopped"},
         "log": {"path", "messages", "bytes"},
         "noise": {"scale"},
+        "cycles": {"count", "late", "limit_ms", "longest_ms"},
     }
     assert set(judged) - set(parts) - {"rejected"} == {
         "scenario",

@@ -1,0 +1,34 @@
+"""The log of a long run, replayed in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """How a replay of a log went: its exit code, outputs compared, and those that differ."""
+
+    code: int
+    compared: int
+    differ: int
+
+
+def verified_log(log: Path) -> Verification | None:
+    """Replay a log and compare; None where there is none."""
+    if not log.is_file():
+        return None
+    command = [sys.executable, "-m", "hil", "replay", str(log), "--verify", "--json"]
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    summary: dict[str, Any] = json.loads(done.stdout) if done.stdout.strip() else {}
+    counts = summary.get("parity", {}).values()
+    return Verification(
+        done.returncode,
+        sum(each["compared"] for each in counts),
+        sum(each["mismatched"] for each in counts),
+    )
