@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import Protocol
 
 from hil.live.daemon import Ending
+from hil.live.service import Service
 from hil.nodes.node import Outgoing
 from hil.scenario.schema import Scenario
 from hil.wire.pubsub import Wire, joined
@@ -44,13 +45,16 @@ def run_bridge(
     The bridge is made once the wire is there, and is given it. Topics lie where the scenario has them.
     """
     with joined(endpoints, scenario, "bridge", give_up=lambda: ending.asked) as wire:
-        bridge = make_bridge(wire)
+        bridge, service = make_bridge(wire), Service()
         try:
+            service.ready(time.monotonic())
             on_ready()
             until = None if duration_s is None else time.monotonic() + duration_s
             while not ending.asked and (until is None or time.monotonic() < until):
                 bridge.wait(_LONGEST_WAIT)
+                service.goes_round(time.monotonic())
                 _publish(wire, bridge.take(time.time_ns()))
+            service.ends()
             _publish(wire, bridge.end(time.time_ns()))
         finally:
             bridge.close()

@@ -26,8 +26,10 @@ def command(secure: Path | None, listen: str | None, zenoh_config: Path | None, 
     role does what it is for; without it everybody who reaches the endpoint may do everything.
     """
     import threading
+    import time
 
     from hil.live.daemon import Ending
+    from hil.live.service import Service
     from hil.wire.link_watch import links_said
     from hil.wire.role_keys import RoleKeys
     from hil.wire.roles import ROUTER
@@ -39,7 +41,7 @@ def command(secure: Path | None, listen: str | None, zenoh_config: Path | None, 
         listen = listen or (SECURE_ENDPOINT if secure else DEFAULT_ENDPOINT)
     endpoints = Endpoints(None, listen, zenoh_config, RoleKeys(secure, ROUTER) if secure else None)
     refuse_deaf(endpoints)
-    ending, asked = Ending(), threading.Event()
+    ending, asked, service = Ending(), threading.Event(), Service()
     ending.notify(asked.set)
     ending.on_signals()
     if tethered:
@@ -51,9 +53,12 @@ def command(secure: Path | None, listen: str | None, zenoh_config: Path | None, 
     try:
         how = f"by the keys of {secure}" if secure else "open to all who reach it"
         with links_said(session, _say):
+            service.ready(time.monotonic())
             _say(f"ready, {endpoints.describe()}, {how}")
             while not ending.asked:
                 asked.wait(_LONGEST_WAIT_S)
+                service.goes_round(time.monotonic())
+            service.ends()
     finally:
         close_session(session)
 

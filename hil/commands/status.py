@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hil.commands.wire_options import endpoints_of, wire_options
+from hil.errors import CheckFailedError, UsageError
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -24,6 +25,11 @@ _REFRESH_S = 0.25
 @click.command("status", params=wire_options(listens=False))
 @click.argument("scenario", default="turtlebot3")
 @click.option("--once", is_flag=True, help="Look for a moment, print, and end.")
+@click.option(
+    "--needs",
+    metavar="NODES",
+    help="With --once: end with 1 unless these nodes, by commas, are heard and well.",
+)
 @click.option("--json", "as_json", is_flag=True, help="The same as one JSON object on stdout.")
 def command(
     scenario: str,
@@ -31,6 +37,7 @@ def command(
     secure: Path | None,
     zenoh_config: Path | None,
     once: bool,
+    needs: str | None,
     as_json: bool,
     overrides: tuple[str, ...],
 ) -> None:
@@ -42,6 +49,8 @@ def command(
     from hil.scenario.files import load_scenario
     from hil.wire.pubsub import joined
 
+    if needs is not None and not (once or as_json):
+        raise UsageError(f"--needs {needs}: is for one look; give --once or --json with it")
     chosen = load_scenario(scenario, overrides)
     state = LabState(chosen)
     clock = time.monotonic
@@ -52,9 +61,12 @@ def command(
         hear_for(state, take, clock, clock() + _FIRST_LOOK_S)
         if as_json:
             click.echo(json.dumps(state.as_dict(clock())))
-            return
-        if once:
+        elif once:
             Console().print(_table(state, clock()))
+        if once or as_json:
+            wanted = [name for name in (needs or "").split(",") if name]
+            if unwell := state.unwell(wanted, clock()):
+                raise CheckFailedError("; ".join(unwell))
             return
         with Live(_table(state, clock()), auto_refresh=False) as shown:
             while True:

@@ -89,7 +89,8 @@ def _by_run(role: str, mode: str) -> Expected:
 def _by_hand(role: str, mode: str) -> Expected:
     """By hand, where guards alone make robots stand."""
     ended = {"kill": -signal.SIGKILL}.get(mode, 0)
-    silent = role in ("recorder", "estimator") or (role, mode) == ("guard", "kill")
+    # A guard that is frozen finds, once it goes on, how old everything is.
+    silent = role in ("recorder", "estimator") or (role == "guard" and mode != "stop")
     words = () if silent else ("latched (",)
     if role == "estimator":
         # Whose controller stays alive stands for want of estimates, and may go on when they come.

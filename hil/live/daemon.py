@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, Protocol
 from hil.live.flood_watch import FloodWatch
 from hil.live.listener_watch import ListenerWatch
 from hil.live.sender_reports import SenderReports
+from hil.live.service import Service
 from hil.nodes.node import Outgoing
 from hil.scenario.schema import Scenario
 from hil.wire.events import TICK, Event
@@ -64,8 +65,12 @@ ANONYMOUS = Presence()
 
 
 class Watches(NamedTuple):
-    """Who may be listened to, and what there is to say, at a time, of what comes and of who listens."""
+    """Who may be listened to, and what there is to say, at a time, of what comes and of who listens.
 
+    ``service``: hears each time that the daemon goes round.
+    """
+
+    service: Service
     senders: SenderWatch
     reports: Callable[[int], Iterable[Outgoing]]
 
@@ -149,9 +154,11 @@ def run_daemon(
         gc.freeze()
         senders = SenderWatch(single_topics(scenario))
         watch = _reports_on(wire, presence, senders)
+        service = Service()
+        service.ready(time.monotonic())
         on_ready()
         try:
-            _work(worker, wire, ending, duration_s, Watches(senders, watch))
+            _work(worker, wire, ending, duration_s, Watches(service, senders, watch))
         except Exception:
             # A controller that breaks down says stop all the same. The first error is the one to tell.
             with contextlib.suppress(Exception):
@@ -183,6 +190,7 @@ def _work(
     while not ending.asked and (until is None or time.monotonic() < until):
         wait = min((worker.due_ns() - time.time_ns()) * 1e-9, _LONGEST_WAIT)
         event = wire.inbox.take(wait)
+        watches.service.goes_round(time.monotonic())
         now_ns = time.time_ns()
         if now_ns < taken_ns:
             # The clock was set back: what was due soon is now far away.
@@ -194,6 +202,7 @@ def _work(
         if (taken_ns := time.time_ns()) >= worker.due_ns():
             _publish(wire, worker.take(TICK, taken_ns))
         _publish(wire, watches.reports(taken_ns))
+    watches.service.ends()
     for messages in aftermath(wire.inbox, worker):
         _publish(wire, messages)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,6 +21,8 @@ from hil.wire.source_topics import source_topics
 
 _RATE_OVER_S = 2.0
 _QUIET_S = 0.25
+_SILENT_S = 3.0
+"""Nodes report twice a second: one that has not for so long [s] is not there."""
 _REFUSED = "refused."
 _MOST_NAMES = 4096  # of daemons and of bodies: anybody may send any
 
@@ -122,6 +124,19 @@ class LabState:
             for topic, name in self.robots.items()
             if topic not in self._heard and self._wheels[name] not in self._heard
         ]
+
+    def unwell(self, names: Sequence[str], now: float) -> list[str]:
+        """What is wrong with nodes that are needed, in words: silent, with a problem, or with findings."""
+        said = {each["name"]: each for each in self.as_dict(now)["daemons"]}
+        wrong = []
+        for name in names:
+            if name not in said or said[name]["age_s"] > _SILENT_S:
+                wrong.append(f"{name} is not heard")
+                continue
+            found = [f"{each['name']}: {each['text']}" for each in said[name]["findings"]]
+            texts = [*([] if said[name]["ok"] else [said[name]["says"]]), *found]
+            wrong += [f"{name}: {text}" for text in texts]
+        return wrong
 
     def as_dict(self, now: float) -> dict[str, Any]:
         """All of it, as results have it; ages in seconds."""

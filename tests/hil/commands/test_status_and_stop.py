@@ -158,3 +158,27 @@ def test_a_doctor_who_lets_a_robot_creep_heeds_a_stop(lab: tuple[str, Wire]) -> 
     assert len(told) < 60
     assert doctor.returncode == 1
     assert "follower stands: somebody said stop (enough)" in said
+
+
+def test_one_look_ends_with_1_unless_all_that_is_needed_is_heard_and_well(lab: tuple[str, Wire]) -> None:
+    endpoint, wire = lab
+    look = ("status", "--once", "--connect", endpoint, "--needs")
+    deaf = {"finding.deaf_robot": "nobody listens"}
+    said = (
+        ("diagnostics", encode(diagnostics("recorder", 5, "", {}))),
+        ("diagnostics", encode(diagnostics("estimator", 5, "waiting for frames", {}))),
+        ("diagnostics", encode(diagnostics("controller", 5, "", deaf))),
+    )
+    with again(wire, *said):
+        assert ran(*look, "recorder").returncode == 0
+        done = ran(*look, "recorder,estimator,controller,leader")
+    assert done.returncode == 1
+    for words in ("estimator: waiting for frames", "controller: deaf_robot: nobody", "leader is not heard"):
+        assert words in done.stderr
+    assert "recorder:" not in done.stderr
+
+
+def test_what_is_needed_is_for_one_look(lab: tuple[str, Wire]) -> None:
+    done = ran("status", "--connect", lab[0], "--needs", "recorder")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "--once" in done.stderr
