@@ -66,8 +66,9 @@ def _try_all(chosen: list[Fault], tries: int, *, as_json: bool, out: Path | None
 
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, leave)
-    cases, skipped = tried(chosen, tries, lambda line: click.echo(line, err=True))
-    result, page = as_result(cases, skipped), as_markdown(cases, skipped)
+    session = tried(chosen, tries, lambda line: click.echo(line, err=True))
+    result = as_result(session.cases, session.skipped)
+    page = as_markdown(session.cases, session.skipped)
     if out is not None:
         try:
             out.mkdir(parents=True, exist_ok=True)
@@ -79,5 +80,7 @@ def _try_all(chosen: list[Fault], tries: int, *, as_json: bool, out: Path | None
         print_json(result)
     else:
         print_text(page[page.index("|") :] if "|" in page else page)
-    if any(case.failed for case in cases):
+    if session.interrupted:
+        raise KeyboardInterrupt
+    if any(case.failed for case in session.cases):
         sys.exit(1)

@@ -5,34 +5,52 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from hil.faults.attempt import attempt
+from hil.faults.attempt import Try, attempt
 from hil.faults.fault import Fault
 from hil.faults.link import NotHereError
 from hil.faults.report import NEVER_TRIED, Skipped
 from hil.faults.tally import Case, worst_of
 
 
-def tried(
-    faults: Sequence[Fault], tries: int, say: Callable[[str], None]
-) -> tuple[list[Case], list[Skipped]]:
-    """Try faults, and tell of each by ``say``: what came of them, and what could not be tried and why."""
-    cases, skipped = list[Case](), list[Skipped]()
+@dataclass(slots=True)
+class Session:
+    """What came of faults, what could not be tried and why, and whether it was broken off by Ctrl-C."""
+
+    cases: list[Case] = field(default_factory=list)
+    skipped: list[Skipped] = field(default_factory=list)
+    interrupted: bool = False
+
+
+def tried(faults: Sequence[Fault], tries: int, say: Callable[[str], None]) -> Session:
+    """Try faults, and tell of each by ``say``. Ctrl-C leaves what there is by then."""
+    session = Session()
+    try:
+        _try_each(session, faults, tries, say)
+    except KeyboardInterrupt:
+        session.interrupted = True
+    session.skipped += NEVER_TRIED
+    return session
+
+
+def _try_each(session: Session, faults: Sequence[Fault], tries: int, say: Callable[[str], None]) -> None:
     with tempfile.TemporaryDirectory(prefix="abreast-faults-") as name:
         for number, fault in enumerate(faults, start=1):
             begun_s = time.monotonic()
+            done: list[Try] = []
             try:
                 # By numbers: a fault's own name in a path is not to pass for the word that names it.
-                done = [attempt(fault, Path(name) / f"{number}-{turn}") for turn in range(tries)]
+                done.extend(attempt(fault, Path(name) / f"{number}-{turn}") for turn in range(tries))
             except NotHereError as error:
-                skipped.append(Skipped(fault.name, str(error)))
+                session.skipped.append(Skipped(fault.name, str(error)))
                 say(f"{number}/{len(faults)} {fault.name}: skipped, {error}")
                 continue
-            case = Case(fault, tries, worst_of(done))
-            cases.append(case)
-            say(f"{number}/{len(faults)} {_told(case)}, {time.monotonic() - begun_s:.0f} s")
-    return cases, [*skipped, *NEVER_TRIED]
+            finally:
+                if done:
+                    session.cases.append(Case(fault, len(done), worst_of(done)))
+            say(f"{number}/{len(faults)} {_told(session.cases[-1])}, {time.monotonic() - begun_s:.0f} s")
 
 
 def _told(case: Case) -> str:

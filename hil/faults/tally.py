@@ -10,7 +10,7 @@ from hil.faults.attempt import Try
 from hil.faults.fault import Fault
 
 LIMIT_S = 0.3
-"""So long [s] after its reason a robot may be told to move at most."""
+"""So long [s] after its reason a robot may be told to move, and so old may a command be that it obeys."""
 
 COUNTS = ("lost_logs", "wrong_exit", "wrong_reason", "hangs", "orphans")
 """What is to be zero in every case."""
@@ -44,7 +44,8 @@ class Case:
 
 def is_wrong(worst: Try) -> bool:
     """Whether figures are beyond what they may be."""
-    return worst.runaway_s > LIMIT_S or any(getattr(worst, name) for name in COUNTS)
+    beyond = max(worst.runaway_s, worst.oldest_command_s) > LIMIT_S
+    return beyond or any(getattr(worst, name) for name in COUNTS)
 
 
 def worst_of(tries: Sequence[Try]) -> Try:

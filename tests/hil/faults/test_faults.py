@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -28,6 +31,32 @@ def test_a_handful_of_faults_does_not_let_a_robot_go(tmp_path: Path) -> None:
     assert all(case["oldest_command_s"] > 0.0 for case in result["cases"])
     assert result == json.loads((tmp_path / "faults.json").read_text(encoding="utf-8"))
     assert "kill-follower-run" in (tmp_path / "reliability.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_ctrl_c_leaves_what_was_tried_by_then(tmp_path: Path) -> None:
+    words = ["faults", "--only", "term-recorder-by-hand", "--tries", "50", "--out", str(tmp_path), "--json"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "hil", *words], stdout=subprocess.PIPE, text=True
+    ) as process:
+        until = time.monotonic() + 300.0
+        # The second try has begun once its folder is there.
+        while time.monotonic() < until and not second_tries(process.pid):
+            time.sleep(0.2)
+        process.send_signal(signal.SIGINT)
+        told, _ = process.communicate(timeout=120.0)
+    assert process.returncode == 130
+    (case,) = json.loads(told)["cases"]
+    assert case["fault"] == "term-recorder-by-hand"
+    assert 1 <= case["tries"] < 50
+    assert (tmp_path / "reliability.md").is_file()
+
+
+def second_tries(pid: int) -> list[str]:
+    """Processes of a second or later try."""
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8").split()
+    words = [Path(f"/proc/{each}/cmdline").read_text(encoding="utf-8") for each in children]
+    return [each for each in words if re.search(r"abreast-faults-\w+/1-[1-9]", each)]
 
 
 def test_a_fault_that_is_none_is_said() -> None:

@@ -53,6 +53,8 @@ def test_a_runaway_beyond_the_limit_fails_a_case_unless_it_is_not_covered() -> N
     assert not Case(COVERED, 1, Try(runaway_s=LIMIT_S)).failed
     assert Case(COVERED, 1, beyond).failed
     assert not Case(UNCOVERED, 1, beyond).failed
+    assert not Case(COVERED, 1, Try(oldest_command_s=LIMIT_S)).failed
+    assert Case(COVERED, 1, Try(oldest_command_s=LIMIT_S + 0.01)).failed
 
 
 def test_the_result_has_every_number_of_every_case() -> None:
