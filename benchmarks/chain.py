@@ -18,6 +18,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,10 @@ PROGRAM = Impulse(0.5, 1.0, 5.0, 1.0)
 GAINS, LIMITS = Gains(MU1, MU2, Spacing(RHO_0, MU_RHO)), Limits(V_MAX, 1e3)
 FIRST = Pose(0.0, -0.5, 0.0)
 TARGET, MEASURED = 20.0, "compiled chain, 1e-5"
+
+
+Method = Literal["RK45", "DOP853", "LSODA"]
+"""Of SciPy."""
 
 
 def plain_rates(t: float, state: FloatArray) -> list[float]:
@@ -81,10 +86,10 @@ def start(agents: int) -> FloatArray:
 
 
 def by_scipy(
-    rates: Callable[[float, FloatArray], object],
+    rates: Callable[[float, FloatArray], FloatArray | list[float]],
     times: FloatArray,
     agents: int,
-    method: str,
+    method: Method,
     rtol: float,
     atol: float,
 ) -> FloatArray:

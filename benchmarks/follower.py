@@ -290,7 +290,8 @@ def main() -> None:
     if sys.argv[1:2] == ["router"]:
         return serve_router(sys.argv[2])
     if sys.argv[1:2] == ["null"]:
-        return serve_null(*sys.argv[2:5], size=int(sys.argv[5]))
+        endpoint, hear, say, size = sys.argv[2:6]
+        return serve_null(endpoint, hear, say, int(size))
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("what", choices=["trip", "chain"])
     parser.add_argument("--rates", default="120,240")

@@ -18,6 +18,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
@@ -74,7 +75,7 @@ class Adversary:
         )
         self._patterns = [_signs(flying, v1) for v1 in np.linspace(limits.v_eps, limits.k_v, 4).tolist()]
 
-    def leader(self) -> tuple[FloatArray, FloatArray]:
+    def leader(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
         """Positions and velocities (n,), as complex numbers: arcs as hard as the acceleration allows."""
         random, h = self._random, self.period_ns * 1e-9
         v1 = float(random.uniform(self._limits.v_eps, self._limits.k_v))
@@ -84,7 +85,7 @@ class Adversary:
         chords = v1 * h * np.sinc(half / math.pi) * np.exp(1j * (heading + half))
         return np.concatenate([[0.0], np.cumsum(chords[:-1])]), v1 * np.exp(1j * heading)
 
-    def noise(self) -> FloatArray:
+    def noise(self) -> NDArray[np.complex128]:
         """Errors (n,) of positions, as complex numbers, each axis at its limit."""
         random, limit = self._random, SIGMAS * self._given.estimator.sigma_position
         kind = random.integers(3)
@@ -99,15 +100,14 @@ class Adversary:
             length = int(random.integers(10, len(pattern)))
             repeated = np.tile(pattern[-length:], FRAMES // length + 1)[:FRAMES]
             signs = [repeated * random.choice([-1.0, 1.0]) for _ in range(2)]
-        noise: FloatArray = limit * (signs[0] + 1j * signs[1])
-        return noise
+        return np.asarray(limit * (signs[0] + 1j * signs[1]), dtype=np.complex128)
 
     def _square(self, hold: float, h: float) -> FloatArray:
         """Signs (n,) that switch after ``hold`` [s], sharply or by chance."""
         if self._random.random() < 0.5:
             return np.where((np.arange(FRAMES) * h / hold).astype(int) % 2 == 0, 1.0, -1.0)
         flips = np.where(self._random.random(FRAMES) < h / hold, -1.0, 1.0)
-        return np.cumprod(flips)
+        return np.asarray(np.cumprod(flips), dtype=np.float64)
 
 
 def _signs(flying: FlyingFilter, v1: float) -> FloatArray:
@@ -117,7 +117,7 @@ def _signs(flying: FlyingFilter, v1: float) -> FloatArray:
     for _ in range(200):
         weights.append(float(weight[3]))
         weight = dynamics.M @ weight
-    return np.sign(np.array(weights[::-1]))
+    return np.asarray(np.sign(weights[::-1]), dtype=np.float64)
 
 
 def main() -> None:

@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -132,12 +133,26 @@ def decisions() -> dict[str, tuple[Callable[[], object], Callable[[], object]]]:
         store(receipts, k, Receipt(k, NOW_NS))
     now = to_time(NOW_NS)
     consumed = [msg.Consumed(k, now) for k in range(RECEIPTS)]
-    estimate = msg.LeaderEstimate(
-        header(NOW_NS, "f"), now, now, *[0.5] * 9, covariance, 0.5, 1, "", 0.5, 0.5, 0.5, consumed
-    )
+    seen: list[Any] = [
+        header(NOW_NS, "f"),
+        now,
+        now,
+        *[0.5] * 9,
+        covariance,
+        0.5,
+        1,
+        "",
+        0.5,
+        0.5,
+        0.5,
+        consumed,
+    ]
+    estimate = msg.LeaderEstimate(*seen)
     payload, ours = encode(estimate), templates.estimate_template("f", RECEIPTS)
-    decision = row_of(CommandNumbers(NOW_NS, NOW_NS, NOW_NS, 0, RECEIPTS, *[0.5] * 4, False, True))
-    command = msg.Command(header(NOW_NS, "f"), now, now, *[0.5] * 4, False, "", True, consumed)
+    decided: list[Any] = [NOW_NS, NOW_NS, NOW_NS, 0, RECEIPTS, *[0.5] * 4, False, True]
+    decision = row_of(CommandNumbers(*decided))
+    sent: list[Any] = [header(NOW_NS, "f"), now, now, *[0.5] * 4, False, "", True, consumed]
+    command = msg.Command(*sent)
     ours_too, truth = templates.command_template("f", RECEIPTS), templates.truth_template("mocap")
     states, states_of = row_of(TruthNumbers(NOW_NS, 7, *[0.5] * 10)), [0.5] * 10
 
