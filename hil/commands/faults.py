@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import sys
 from pathlib import Path
@@ -15,6 +16,8 @@ from hil.log.report_json import print_json, print_text, results_apart
 
 if TYPE_CHECKING:
     from hil.faults.fault import Fault
+    from hil.faults.session import Session
+    from hil.faults.tally import Case
 
 
 @click.command("faults")
@@ -30,21 +33,53 @@ if TYPE_CHECKING:
     metavar="DIR",
     help="Folder for reliability.md and faults.json.",
 )
+@click.option("--add", is_flag=True, help="Add to the tries that the folder of --out has.")
 @results_apart()
-def command(only: tuple[str, ...], tries: int, as_list: bool, as_json: bool, out: Path | None) -> None:
+def command(
+    only: tuple[str, ...], tries: int, as_list: bool, as_json: bool, out: Path | None, add: bool
+) -> None:
     """Kill, freeze, cut, flood and forge in live runs, and measure for how long a robot goes on.
 
     The robots are emulated, keep their last command for ever, and are judged from outside. A try takes some
-    15 seconds. Link faults and a full disk take root. Ends with 1 where a robot is told to move for longer
+    13 seconds. Link faults and a full disk take root. Ends with 1 where a robot is told to move for longer
     than 0.3 s after its reason, or anything is lost, hangs, is left, or ends for another reason than its
-    fault.
+    fault. Ctrl-C leaves what was tried by then.
     """
     from hil.faults.matrix import faults
+    from hil.faults.report import merged
+    from hil.faults.session import tried
 
     if as_list:
         print_text("".join(f"{fault.name}\n" for fault in faults()))
         return
-    _try_all(_chosen(faults(), only), tries, as_json=as_json, out=out)
+    chosen = _chosen(faults(), only)
+    if add and out is None:
+        raise UsageError("--add: adds to what is in a folder; give --out DIR with it")
+    before = _before(out) if add and out is not None else []
+    _leave_on_signals()
+    session = tried(chosen, tries, lambda line: click.echo(line, err=True))
+    session.cases = merged(before, session.cases, faults())
+    _tell(session, out, as_json=as_json)
+    if session.interrupted:
+        raise KeyboardInterrupt
+    if any(case.failed for case in session.cases):
+        sys.exit(1)
+
+
+def _before(out: Path) -> list[Case]:
+    """What a folder has of before."""
+    from hil.faults.matrix import faults
+    from hil.faults.report import cases_of
+
+    place = out / "faults.json"
+    if not place.exists():
+        return []
+    try:
+        return cases_of(json.loads(place.read_text(encoding="utf-8")), faults())
+    except OSError as error:
+        raise UsageError(f"--add: {place}: {error.strerror}; leave it out, or give another --out") from None
+    except (ValueError, KeyError, TypeError):
+        raise UsageError(f"--add: {place} is no result of this command; leave it out, or move it") from None
 
 
 def _chosen(known: tuple[Fault, ...], only: tuple[str, ...]) -> list[Fault]:
@@ -54,21 +89,23 @@ def _chosen(known: tuple[Fault, ...], only: tuple[str, ...]) -> list[Fault]:
     return [fault for fault in known if not only or any(fault.name.startswith(name) for name in only)]
 
 
-def _try_all(chosen: list[Fault], tries: int, *, as_json: bool, out: Path | None) -> None:
-    from hil.faults.report import as_markdown, as_result
-    from hil.faults.session import tried
-    from hil.log.report_json import write_json
-    from hil.log.written_aside import write_text_aside
+def _leave_on_signals() -> None:
+    """End as by Ctrl-C: else what was started and mounted would stay."""
 
     def leave(_number: int, _frame: FrameType | None) -> None:
-        # Else what was started and mounted would stay.
         raise KeyboardInterrupt
 
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, leave)
-    session = tried(chosen, tries, lambda line: click.echo(line, err=True))
-    result = as_result(session.cases, session.skipped)
-    page = as_markdown(session.cases, session.skipped)
+
+
+def _tell(session: Session, out: Path | None, *, as_json: bool) -> None:
+    """Leave and print what came of it."""
+    from hil.faults.report import as_markdown, as_result
+    from hil.log.report_json import write_json
+    from hil.log.written_aside import write_text_aside
+
+    result, page = as_result(session.cases, session.skipped), as_markdown(session.cases, session.skipped)
     if out is not None:
         try:
             out.mkdir(parents=True, exist_ok=True)
@@ -80,7 +117,3 @@ def _try_all(chosen: list[Fault], tries: int, *, as_json: bool, out: Path | None
         print_json(result)
     else:
         print_text(page[page.index("|") :] if "|" in page else page)
-    if session.interrupted:
-        raise KeyboardInterrupt
-    if any(case.failed for case in session.cases):
-        sys.exit(1)

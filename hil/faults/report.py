@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from hil.faults.tally import COUNTS, LIMIT_S, Case
+from hil.faults.fault import Fault
+from hil.faults.tally import COUNTS, LIMIT_S, Case, both, case_of_row
 
 
 class Skipped(NamedTuple):
@@ -66,6 +67,24 @@ def as_result(cases: Sequence[Case], skipped: Sequence[Skipped]) -> dict[str, An
         ],
         "skipped": [each._asdict() for each in skipped],
     }
+
+
+def cases_of(result: Mapping[str, Any], faults: Sequence[Fault]) -> list[Case]:
+    """The cases that a result has, in the order of the faults; of what is no fault any more there is none.
+
+    Raises :class:`KeyError` for what is no result.
+    """
+    rows = {row["fault"]: row for row in (*result["cases"], *result["not_covered"])}
+    return [case_of_row(fault, rows[fault.name]) for fault in faults if fault.name in rows]
+
+
+def merged(before: Sequence[Case], now: Sequence[Case], faults: Sequence[Fault]) -> list[Case]:
+    """Cases of two sessions, in the order of the faults, each with the tries of both."""
+    found = {case.fault.name: case for case in before}
+    for case in now:
+        name = case.fault.name
+        found[name] = both(found[name], case) if name in found else case
+    return [found[fault.name] for fault in faults if fault.name in found]
 
 
 def as_markdown(cases: Sequence[Case], skipped: Sequence[Skipped]) -> str:

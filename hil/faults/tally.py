@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -31,8 +31,7 @@ class Case:
 
     def as_row(self) -> dict[str, Any]:
         """The case as JSON has it, with every number."""
-        names = [each.name for each in fields(Try) if each.name != "wrong"]
-        figures = {name: getattr(self.worst, name) for name in names}
+        figures = {name: getattr(self.worst, name) for name in _FIGURES}
         return {
             "fault": self.fault.name,
             "role": self.fault.role,
@@ -40,6 +39,16 @@ class Case:
             "tries": self.tries,
             **{name: round(each, 4) if isinstance(each, float) else each for name, each in figures.items()},
         }
+
+
+def case_of_row(fault: Fault, row: Mapping[str, Any]) -> Case:
+    """The case of a row of a result, to its four decimals; raises :class:`KeyError` for what is none."""
+    return Case(fault, int(row["tries"]), Try(**{name: row[name] for name in _FIGURES}))
+
+
+def both(first: Case, second: Case) -> Case:
+    """A case of the tries of two."""
+    return Case(first.fault, first.tries + second.tries, worst_of([first.worst, second.worst]))
 
 
 def is_wrong(worst: Try) -> bool:
@@ -58,4 +67,5 @@ def worst_of(tries: Sequence[Try]) -> Try:
     )
 
 
+_FIGURES = tuple(each.name for each in fields(Try) if each.name != "wrong")
 _LARGEST = ("runaway_s", "runaway_m", "oldest_command_s", "memory_mb")

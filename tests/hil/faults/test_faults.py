@@ -66,6 +66,14 @@ def test_a_fault_that_is_none_is_said() -> None:
     assert "--list" in done.stderr
 
 
+def test_what_is_there_is_added_to_if_it_is_a_result(tmp_path: Path) -> None:
+    assert faults("--add", "--only", "kill-follower-run").returncode == 2
+    (tmp_path / "faults.json").write_text('{"cases": 3}', encoding="utf-8")
+    done = faults("--add", "--out", str(tmp_path), "--only", "kill-follower-run")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "faults.json is no result" in done.stderr
+
+
 def test_all_names_are_listed() -> None:
     done = faults("--list")
     assert done.returncode == 0

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hil.faults.attempt import Try
 from hil.faults.matrix import faults
-from hil.faults.report import NEVER_TRIED, as_markdown, as_result
+from hil.faults.report import NEVER_TRIED, as_markdown, as_result, cases_of, merged
 from hil.faults.tally import COUNTS, LIMIT_S, Case, worst_of
 
 figures = st.floats(0.0, 100.0)
@@ -55,6 +55,17 @@ def test_a_runaway_beyond_the_limit_fails_a_case_unless_it_is_not_covered() -> N
     assert not Case(UNCOVERED, 1, beyond).failed
     assert not Case(COVERED, 1, Try(oldest_command_s=LIMIT_S)).failed
     assert Case(COVERED, 1, Try(oldest_command_s=LIMIT_S + 0.01)).failed
+
+
+@given(st.lists(tries, min_size=1, max_size=3), st.lists(tries, min_size=1, max_size=3))
+def test_tries_of_two_sessions_add_up_to_those_of_one(first: list[Try], second: list[Try]) -> None:
+    before, now = (Case(COVERED, len(each), worst_of(each)) for each in (first, second))
+    other = Case(UNCOVERED, 1, first[0])
+    kept = cases_of(json.loads(json.dumps(as_result([before, other], []))), faults())
+    found = {case.fault.name: case for case in merged(kept, [now], faults())}
+    assert found[UNCOVERED.name].as_row() == other.as_row()
+    whole = Case(COVERED, len(first) + len(second), worst_of([*first, *second]))
+    assert found[COVERED.name].as_row() == pytest.approx(whole.as_row(), abs=1e-4)
 
 
 def test_the_result_has_every_number_of_every_case() -> None:
