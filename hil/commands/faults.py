@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import sys
 from pathlib import Path
@@ -33,10 +34,17 @@ if TYPE_CHECKING:
     metavar="DIR",
     help="Folder for reliability.md and faults.json.",
 )
+@click.option("--ros", is_flag=True, help="Drivers are reached and judged in ROS 2, by rclpy.")
 @click.option("--add", is_flag=True, help="Add to the tries that the folder of --out has.")
 @results_apart()
 def command(
-    only: tuple[str, ...], tries: int, as_list: bool, as_json: bool, out: Path | None, add: bool
+    only: tuple[str, ...],
+    tries: int,
+    as_list: bool,
+    as_json: bool,
+    out: Path | None,
+    ros: bool,
+    add: bool,
 ) -> None:
     """Kill, freeze, cut, flood and forge in live runs, and measure for how long a robot goes on.
 
@@ -47,6 +55,7 @@ def command(
     """
     from hil.faults.matrix import faults
     from hil.faults.report import merged
+    from hil.faults.ros_ear import refuse_without_ros
     from hil.faults.session import tried
 
     if as_list:
@@ -55,9 +64,11 @@ def command(
     chosen = _chosen(faults(), only)
     if add and out is None:
         raise UsageError("--add: adds to what is in a folder; give --out DIR with it")
-    before = _before(out) if add and out is not None else []
+    if ros:
+        refuse_without_ros()
+    before = _before(out, ros) if add and out is not None else []
     _leave_on_signals()
-    session = tried(chosen, tries, lambda line: click.echo(line, err=True))
+    session = tried(chosen, tries, lambda line: click.echo(line, err=True), _domain() if ros else None)
     session.cases = merged(before, session.cases, faults())
     _tell(session, out, as_json=as_json)
     if session.interrupted:
@@ -66,8 +77,13 @@ def command(
         sys.exit(1)
 
 
-def _before(out: Path) -> list[Case]:
-    """What a folder has of before."""
+def _domain() -> int:
+    """A ROS domain that is hardly anybody's."""
+    return 40 + os.getpid() % 60
+
+
+def _before(out: Path, ros: bool) -> list[Case]:
+    """What a folder has of before, of drivers that hear where they do now."""
     from hil.faults.matrix import faults
     from hil.faults.report import cases_of
 
@@ -75,11 +91,14 @@ def _before(out: Path) -> list[Case]:
     if not place.exists():
         return []
     try:
-        return cases_of(json.loads(place.read_text(encoding="utf-8")), faults())
+        result = json.loads(place.read_text(encoding="utf-8"))
+        if result["ros"] == ros:
+            return cases_of(result, faults())
     except OSError as error:
         raise UsageError(f"--add: {place}: {error.strerror}; leave it out, or give another --out") from None
     except (ValueError, KeyError, TypeError):
         raise UsageError(f"--add: {place} is no result of this command; leave it out, or move it") from None
+    raise UsageError(f"--add: {place} is of drivers {'on the wire' if ros else 'in ROS'}; give another --out")
 
 
 def _chosen(known: tuple[Fault, ...], only: tuple[str, ...]) -> list[Fault]:
@@ -105,7 +124,8 @@ def _tell(session: Session, out: Path | None, *, as_json: bool) -> None:
     from hil.log.report_json import write_json
     from hil.log.written_aside import write_text_aside
 
-    result, page = as_result(session.cases, session.skipped), as_markdown(session.cases, session.skipped)
+    result = as_result(session.cases, session.skipped, ros=session.ros)
+    page = as_markdown(session.cases, session.skipped, ros=session.ros)
     if out is not None:
         try:
             out.mkdir(parents=True, exist_ok=True)

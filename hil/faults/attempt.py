@@ -35,12 +35,13 @@ class Try:
     wrong: tuple[str, ...] = ()
 
 
-def attempt(fault: Fault, folder: Path) -> Try:
+def attempt(fault: Fault, folder: Path, ros: int | None = None) -> Try:
     """Try a fault once, with all that is written in a folder that is not there yet.
 
+    ``ros``: a ROS domain in which the drivers hear, None for on the wire.
     Raises :class:`~hil.faults.link.NotHereError` for what this machine does not have.
     """
-    with running_lab(folder, fault.setting) as lab:
+    with running_lab(folder, fault.setting, ros) as lab:
         if fault.setting.drives and not lab.await_driving():
             said = lab.processes.said()[-300:]
             return Try(hangs=1, memory_mb=lab.processes.memory_mb, wrong=(f"never drove: {said}",))

@@ -92,11 +92,14 @@ class Lab:
 
 
 @contextmanager
-def running_lab(folder: Path, setting: Setting) -> Iterator[Lab]:
+def running_lab(folder: Path, setting: Setting, ros: int | None = None) -> Iterator[Lab]:
     """A lab that comes up; whatever of it is left when the block ends is killed.
 
+    ``ros``: a ROS domain in which drivers hear; None for on the wire. There both robots are behind a cable.
     Raises :class:`NotHereError` for what this machine does not have.
     """
+    if ros is not None and setting.how == "emulated":
+        raise NotHereError("emulated robots have no driver in ROS")
     folder.mkdir(parents=True)
     with ExitStack() as held:
         if setting.disk_mb:
@@ -108,7 +111,10 @@ def running_lab(folder: Path, setting: Setting) -> Iterator[Lab]:
         lab = Lab(folder, setting, processes, link)
         own = folder / "scenario.toml"
         chosen = with_guards(
-            load_scenario(SCENARIO, ["run.evaluate_from_s=0.5", f"leader.program={_PROGRAM}"])
+            load_scenario(
+                SCENARIO,
+                ["run.evaluate_from_s=0.5", f"leader.program={_PROGRAM}", f"wire.domain={ros or 0}"],
+            )
         )
         own.write_text(scenario_text(chosen), encoding="utf-8")
         nears = {"leader": held.enter_context(reserved_endpoint()), "follower": link.near}
@@ -122,16 +128,20 @@ def running_lab(folder: Path, setting: Setting) -> Iterator[Lab]:
         ]
         shows = [] if setting.how == "emulated" else ["--shows"]
         notes = str(folder / "notes")
-        processes.start("observer", "-m", "hil.faults.observer", link.router, notes, *places, *shows)
+        in_ros = ["--ros", str(ros)] if ros is not None else []
+        words = "hil.faults.observer", link.router, notes, *places, *shows, *in_ros
+        processes.start("observer", "-m", *words, before=link.before if in_ros else ())
         if setting.how != "emulated":
-            _start_guards(lab, own, nears)
+            _start_guards(lab, own, nears, in_ros=bool(in_ros))
         yield lab
 
 
-def _start_guards(lab: Lab, scenario: Path, nears: dict[str, str]) -> None:
+def _start_guards(lab: Lab, scenario: Path, nears: dict[str, str], *, in_ros: bool) -> None:
     for robot, near in nears.items():
-        far, before = (lab.link.far, lab.link.before) if robot == "follower" else (lab.link.router, ())
-        words = "guard", str(scenario), "--robot", robot, "--connect", far, "--listen", near
+        away = robot == "follower" or (in_ros and lab.link.before)
+        far, before = (lab.link.far, lab.link.before) if away else (lab.link.router, ())
+        side = ("--ros",) if in_ros else ("--listen", near)
+        words = "guard", str(scenario), "--robot", robot, "--connect", far, *side
         lab.processes.start(f"guard-{robot}", "-m", "hil", *words, before=before)
 
 

@@ -1,7 +1,8 @@
 """The outside judge: robots, and a motion capture that sees them, in a process of its own.
 
-It takes what drivers are told, moves the robots by it, and writes down every command and every way rolled.
-Of abreast it uses the wire alone, so that no error of a guard, an emulator or a controller is also its own.
+It takes what drivers are told, by the wire or in ROS 2, moves the robots by it, and writes down every command
+and every way rolled. Of abreast it uses the wire alone, so that no error of a guard, an emulator or a
+controller is also its own.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import zenoh
 from hil.errors import AbreastError
 from hil.faults.notes import Rolled, Taken, rolled_line, stop_line, taken_line
 from hil.faults.robot import Robot
+from hil.faults.ros_ear import RosEar
 from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.messages import decode_as, encode, header, to_ns
@@ -81,18 +83,28 @@ class Ear:
 
 
 class Observer:
-    """The robots, where they are told what to do, and what is written down of it."""
+    """The robots, where they are told what to do, and what is written down of it.
 
-    def __init__(self, places: Sequence[Place], lab: str, notes: TextIO) -> None:
+    ``ros_domain``: where in ROS 2 drivers are told; None for on the wire.
+    """
+
+    def __init__(self, places: Sequence[Place], lab: str, notes: TextIO, ros_domain: int | None) -> None:
         self._arrivals: Arrivals = queue.SimpleQueue()
         self._robots = {place.name: Robot(place.x, place.y, place.theta) for place in places}
         self._told = {f"{name}/cmd_vel": name for name in self._robots}
         self._notes = notes
         self._dice = np.random.default_rng(1)
-        self._drivers = {
-            place.name: Ear(place.endpoint, [f"{place.name}/cmd_vel"], self._arrivals) for place in places
-        }
         self._lab = Ear(lab, [topics.STOP], self._arrivals)
+        self._ears: list[Ear | RosEar] = [self._lab]
+        self._tells_by: dict[str, Wire] = {}
+        if ros_domain is None:
+            for place in places:
+                ear = Ear(place.endpoint, [f"{place.name}/cmd_vel"], self._arrivals)
+                self._ears.append(ear)
+                self._tells_by[place.name] = ear.wire
+        else:
+            self._ears.append(RosEar(ros_domain, list(self._told), self._hear))
+            self._tells_by = {place.name: self._lab.wire for place in places}
         self._moved_s = time.monotonic()
         self._number = 0
 
@@ -112,8 +124,11 @@ class Observer:
 
     def close(self) -> None:
         """Leave the wire."""
-        for ear in (*self._drivers.values(), self._lab):
+        for ear in reversed(self._ears):
             ear.close()
+
+    def _hear(self, topic: str, payload: bytes, mono_s: float, host_ns: int) -> None:
+        self._arrivals.put(Heard(topic, payload, mono_s, host_ns))
 
     def _take(self, heard: Heard) -> None:
         self._move(max(self._moved_s, heard.mono_s))
@@ -151,7 +166,7 @@ class Observer:
         self._lab.wire.publish(topics.RIGID_BODIES, encode(frame))
         if self._number % EVERY == 0:
             for name, robot in self._robots.items():
-                self._drivers[name].wire.publish(f"{name}/odom", encode(_odometry(stamp_ns, name, robot)))
+                self._tells_by[name].publish(f"{name}/odom", encode(_odometry(stamp_ns, name, robot)))
 
     def _seen(self, robot: Robot) -> msg.Pose:
         x, y, theta = self._dice.normal((robot.x, robot.y, robot.theta), (_NOISE, _NOISE, _TURN_NOISE))
@@ -180,12 +195,13 @@ def main() -> None:
     parser.add_argument("notes", type=Path)
     parser.add_argument("--robot", nargs=5, action="append", required=True)
     parser.add_argument("--shows", action="store_true")
+    parser.add_argument("--ros", type=int, metavar="DOMAIN")
     given = parser.parse_args()
     places = [Place(name, where, *map(float, pose)) for name, where, *pose in given.robot]
     ended: list[bool] = []
     signal.signal(signal.SIGTERM, lambda *_: ended.append(True))
     with given.notes.open("w", encoding="utf-8") as notes:
-        observer = Observer(places, given.lab, notes)
+        observer = Observer(places, given.lab, notes, given.ros)
         observer.run(ended, shows=given.shows)
         observer.close()
 

@@ -42,6 +42,9 @@ shares nothing with abreast but the wire, takes what their drivers are told.
 - `memory`: the largest process [MB].
 
 """
+_IN_ROS = """Drivers hear in ROS 2, by rclpy: guards speak to them without a bridge (`--ros`).
+
+"""
 _HEADS = (
     "fault",
     "tries",
@@ -57,10 +60,14 @@ _HEADS = (
 )
 
 
-def as_result(cases: Sequence[Case], skipped: Sequence[Skipped]) -> dict[str, Any]:
-    """The result as JSON has it; what is not covered stands apart, with what was measured of it."""
+def as_result(cases: Sequence[Case], skipped: Sequence[Skipped], *, ros: bool = False) -> dict[str, Any]:
+    """The result as JSON has it; what is not covered stands apart, with what was measured of it.
+
+    ``ros``: drivers heard in ROS.
+    """
     return {
         "limit_s": LIMIT_S,
+        "ros": ros,
         "cases": [case.as_row() for case in cases if not case.fault.uncovered],
         "not_covered": [
             {**case.as_row(), "why": case.fault.uncovered} for case in cases if case.fault.uncovered
@@ -87,13 +94,13 @@ def merged(before: Sequence[Case], now: Sequence[Case], faults: Sequence[Fault])
     return [found[fault.name] for fault in faults if fault.name in found]
 
 
-def as_markdown(cases: Sequence[Case], skipped: Sequence[Skipped]) -> str:
-    """The page."""
+def as_markdown(cases: Sequence[Case], skipped: Sequence[Skipped], *, ros: bool = False) -> str:
+    """The page; ``ros``: drivers heard in ROS."""
     covered = [case for case in cases if not case.fault.uncovered]
     failed = sum(case.failed for case in covered)
     tries = sum(case.tries for case in covered)
     worst = max((case.worst.runaway_s for case in covered), default=0.0)
-    text = _HEAD.format(limit=LIMIT_S)
+    text = _HEAD.format(limit=LIMIT_S) + (_IN_ROS if ros else "")
     text += f"{len(covered)} faults, {tries} tries: {failed} beyond a limit; the longest runaway is "
     text += f"{worst:.2f} s.\n\n"
     text += _table(covered)

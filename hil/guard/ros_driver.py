@@ -9,6 +9,8 @@ from formation.pose import Motion
 from hil.errors import UsageError
 from hil.guard.order import GuardOrder
 
+NO_RCLPY = "--ros: rclpy is not installed here; source ROS 2's setup.bash, or leave --ros out"
+
 _DEPTH = 1
 
 
@@ -24,9 +26,7 @@ class RosDriver:
             from geometry_msgs.msg import Twist, TwistStamped
             from rclpy.signals import SignalHandlerOptions
         except ImportError:
-            raise UsageError(
-                "--ros: rclpy is not installed here; source ROS 2's setup.bash, or leave --ros out"
-            ) from None
+            raise UsageError(NO_RCLPY) from None
         self._rclpy: Any = rclpy
         self._context: Any = rclpy.Context()
         domain = order.ros_domain or None
