@@ -26,6 +26,7 @@ from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.messages import decode_as, encode
 from hil.wire.pubsub import Wire
+from hil.wire.role_keys import RoleKeys
 from hil.wire.session import Endpoints, close_session, open_session
 
 LAG, FRAME_S, ODOMETRY_S = 0.1, 1.0 / 120.0, 0.05
@@ -49,13 +50,13 @@ class Wheels:
         self.pose = advance(self.pose, self.v, self.u, dt)
 
 
-def live(endpoint: str, table: Path, hand_after: float | None, without: str = "") -> None:
+def live(endpoints: Endpoints, table: Path, hand_after: float | None, without: str = "") -> None:
     """Be the lab until SIGTERM."""
     scenario = load_scenario("turtlebot3")
     program, dice, asked = leader_program(scenario), random.Random(1), []
     robots = dict(zip(("leader", "follower"), map(Wheels, start_poses(scenario)), strict=True))
     signal.signal(signal.SIGTERM, lambda *_: asked.append(True))
-    session = open_session(Endpoints(connect=endpoint), patience=60.0)
+    session = open_session(endpoints, patience=60.0)
     wire = Wire(session)
     wire.subscribe([f"{name}/cmd_vel" for name in robots])
     rows: list[list[float]] = []
@@ -109,5 +110,7 @@ if __name__ == "__main__":
     parser.add_argument("table", type=Path)
     parser.add_argument("--hand", type=float)
     parser.add_argument("--without", default="")
+    parser.add_argument("--secure", type=Path)
     given = parser.parse_args()
-    live(given.endpoint, given.table, given.hand, given.without)
+    keys = RoleKeys(given.secure, "bridge") if given.secure else None
+    live(Endpoints(connect=given.endpoint, keys=keys), given.table, given.hand, given.without)

@@ -22,6 +22,7 @@ from hil.wire.session import reserved_endpoint
 from tests.hil.live.child_run import PATIENCE, Run
 from tests.hil.live.own_poses import off_orbit
 from tests.routers import router
+from tests.tls_labs import lab_keys
 
 pytestmark = pytest.mark.slow
 
@@ -42,26 +43,30 @@ def router_of_the_run() -> Iterator[Met]:
 
 @contextmanager
 def real_run(
-    folder: Path, lab_options: list[str], options: list[str], there: Met | None = None
+    folder: Path,
+    lab_options: list[str],
+    options: list[str],
+    there: Met | None = None,
+    keys: tuple[str, ...] = (),
 ) -> Iterator[tuple[Run, Path]]:
-    """A run, and where the lab leaves the robots' own poses once the run is over."""
+    """A run, and where the lab leaves the robots' own poses once the run is over; ``keys``: for all of it."""
     table = folder / "poses.csv"
     with nullcontext(there) if there else router_of_the_run() as (endpoint, meeting):
         where = [*meeting, "--out", str(folder / "run"), "--json"]
         given = ["--duration", str(DURATION), "--set", f"run.evaluate_from_s={FROM}"]
         process = subprocess.Popen(
-            [sys.executable, "-m", "hil", "run", "turtlebot3", "--real", *where, *given, *options],
+            [sys.executable, "-m", "hil", "run", "turtlebot3", "--real", *where, *keys, *given, *options],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
         )
         lab = subprocess.Popen(
-            [sys.executable, "-m", "tests.hil.live.stranger_lab", endpoint, str(table), *lab_options]
+            [sys.executable, "-m", "tests.hil.live.stranger_lab", endpoint, str(table), *keys, *lab_options]
         )
         commanded = {"leader", "follower"} - {*lab_options[1:], "leader" if "--hand" in lab_options else ""}
         guards = [
-            subprocess.Popen([sys.executable, "-m", "hil", *GUARD, robot, "--connect", endpoint])
+            subprocess.Popen([sys.executable, "-m", "hil", *GUARD, robot, "--connect", endpoint, *keys])
             for robot in sorted(commanded)
         ]
         try:
@@ -113,6 +118,20 @@ def test_a_router_that_is_there_will_do(tmp_path: Path, by: str) -> None:
         with real_run(tmp_path, [], ["--countdown", "0.5"], (endpoint, told)) as (run, _):
             code, summary, err = run.finish()
     assert code == 0, err
+    assert summary["formation"]["orbit_deviation_rms"]["rho"] < 0.003
+
+
+def test_a_run_its_guards_and_its_lab_meet_by_keys(tmp_path: Path) -> None:
+    folder = tmp_path / "keys"
+    lab_keys(folder)
+    with reserved_endpoint("tls") as endpoint:
+        there = endpoint, ["--listen", endpoint]
+        options = ["--countdown", "0.5"]
+        with real_run(tmp_path, [], options, there, ("--secure", str(folder))) as (run, table):
+            code, summary, err = run.finish()
+    assert code == 0, err
+    rho, _ = off_orbit(table, load_scenario("turtlebot3"), (FROM, DURATION - 0.5))
+    assert rho < 0.003
     assert summary["formation"]["orbit_deviation_rms"]["rho"] < 0.003
 
 
