@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -77,9 +78,15 @@ class Starvation:
 
 @dataclass(frozen=True, slots=True)
 class Nothing:
-    """The fault is in the lab already: look for a while [s]."""
+    """The fault is in the lab already: look for a while [s].
+
+    It comes ``at_s`` after the leader has set off and lasts for ``lasts_s``; without them it is there
+    from the beginning.
+    """
 
     for_s: float
+    at_s: float | None = None
+    lasts_s: float = math.inf
 
 
 Act = Signal | LinkFault | Stranger | SecondFollower | FullDisk | Starvation | Nothing

@@ -25,6 +25,7 @@ from hil.faults.lab import SCENARIO, Lab
 _BUSY = "while True: pass"
 _JOINS_S = 30.0
 _TAKES_S = 12.0
+_SETS_OFF_S = 120.0
 
 
 def inject(lab: Lab, act: Act) -> Reason:
@@ -49,10 +50,23 @@ def inject(lab: Lab, act: Act) -> Reason:
             return Reason(from_s)
         case Starvation(for_s):
             return _starve(lab, for_s)
-        case Nothing(for_s):
-            from_s = time.monotonic()
-            lab.watch(for_s, lambda: not lab.is_running())
-            return Reason(from_s, time.monotonic())
+        case Nothing():
+            return _look_on(lab, act)
+
+
+def _look_on(lab: Lab, act: Nothing) -> Reason:
+    from_s = time.monotonic()
+    if act.at_s is not None:
+        lab.watch(_SETS_OFF_S, lambda: bool(_set_off_s(lab)) or not lab.is_running())
+        from_s = _set_off_s(lab) + act.at_s
+    lab.watch(act.for_s, lambda: not lab.is_running())
+    return Reason(from_s, from_s + act.lasts_s if act.at_s is not None else time.monotonic())
+
+
+def _set_off_s(lab: Lab) -> float:
+    """When the leader was first told to drive [s, monotonic], 0 before."""
+    taken = lab.look().of("leader").taken
+    return next((each.at_s for each in taken if each.drives), 0.0)
 
 
 def _send(lab: Lab, role: str, number: signal.Signals, for_s: float) -> Reason:

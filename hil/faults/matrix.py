@@ -48,7 +48,8 @@ _OWN: Mapping[str, Mapping[str, Since]] = {
 
 _GUARD = "a guard that is gone or frozen leaves its driver at its last command until it is started anew"
 _LATCHED = ("latched (", "has said nothing")
-_SHORT = 8.0
+_SHORT, _AT_S, _LASTS_S = 8.0, 3.0, 1.0
+"""How long a run with a fault of a sensor takes, when that comes and how long it lasts [s]."""
 
 
 def faults() -> tuple[Fault, ...]:
@@ -151,9 +152,10 @@ def _clocks() -> Iterator[Fault]:
         setting = Setting(how="hand", clock_s=off_s, drives=False)
         after = Expected({"follower": "fault"}, words=("sender's clock is",))
         yield Fault(f"clock-{off_s:+g}s", "follower", "clock", setting, Nothing(12.0), after)
-    jump = ("--set", "mocap.clock_jump_s=10.0", "--set", "mocap.clock_jump_at_s=3.0")
+    jump = ("--set", "mocap.clock_jump_s=10.0", "--set", f"mocap.clock_jump_at_s={_AT_S}")
     setting = Setting(how="emulated", duration_s=_SHORT, options=jump)
-    yield Fault("mocap-clock-jump", "mocap", "clock_jump", setting, Nothing(_SHORT), _to_its_end())
+    stands = Expected({"follower": "fault"}, codes=(0,))
+    yield Fault("mocap-clock-jump", "mocap", "clock_jump", setting, Nothing(_SHORT, _AT_S), stands)
 
 
 def _to_its_end() -> Expected:
@@ -162,12 +164,16 @@ def _to_its_end() -> Expected:
 
 def _sensors() -> Iterator[Fault]:
     for kind in ("step", "turn", "swap", "freeze", "dropout"):
-        told = f'mocap.faults=[{{kind="{kind}", at_s=3.0, duration_s=1.0'
+        told = f'mocap.faults=[{{kind="{kind}", at_s={_AT_S}, duration_s={_LASTS_S}'
         told += {"step": ", offset=[0.3, 0.2]", "turn": ", angle=1.0"}.get(kind, "") + "}]"
         setting = Setting(how="emulated", duration_s=_SHORT, options=("--set", told))
-        yield Fault(f"mocap-{kind}", "mocap", kind, setting, Nothing(_SHORT), _to_its_end())
+        # Which way the leader's body looks is used for nothing: what turns it stops nobody.
+        believed = kind == "turn"
+        stands = _to_its_end() if believed else Expected({"follower": "fault"}, for_good=False, codes=(0,))
+        act = Nothing(_SHORT) if believed else Nothing(_SHORT, _AT_S, _LASTS_S)
+        yield Fault(f"mocap-{kind}", "mocap", kind, setting, act, stands)
     for kind in ("silent", "nan", "scale", "delay", "reset"):
-        told = f'robot.odometry_faults=[{{kind="{kind}", at_s=3.0, duration_s=1.0}}]'
+        told = f'robot.odometry_faults=[{{kind="{kind}", at_s={_AT_S}, duration_s={_LASTS_S}}}]'
         setting = Setting(how="emulated", duration_s=_SHORT, options=("--set", told))
         yield Fault(f"odometry-{kind}", "odometry", kind, setting, Nothing(_SHORT), _to_its_end())
 

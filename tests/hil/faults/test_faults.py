@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-HANDFUL = ("kill-follower-run", "stop-follower-run", "cut-1s-relay", "second-controller")
+HANDFUL = ("kill-follower-run", "stop-follower-run", "cut-1s-relay", "second-controller", "mocap-dropout")
 
 
 def faults(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -29,6 +29,9 @@ def test_a_handful_of_faults_does_not_let_a_robot_go(tmp_path: Path) -> None:
     assert {case["fault"] for case in result["cases"]} == set(HANDFUL)
     # A robot that did not drive would be told nothing for long as well.
     assert all(case["oldest_command_s"] > 0.0 for case in result["cases"])
+    # The controller goes on for as long as a measurement may be old, and no longer.
+    (blind,) = (case for case in result["cases"] if case["fault"] == "mocap-dropout")
+    assert 0.1 < blind["runaway_s"] < 0.3
     assert result == json.loads((tmp_path / "faults.json").read_text(encoding="utf-8"))
     assert "kill-follower-run" in (tmp_path / "reliability.md").read_text(encoding="utf-8")
 
