@@ -14,6 +14,7 @@ from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
 from formation.station import Side
 from hil.extensions.reference import is_reference, short
+from hil.scenario.kept_certificates import kept_certificate
 from hil.scenario.leader_model import leader_limits, process_noise
 from hil.scenario.noise_bounds import NOISE_SIGMAS, position_bound
 from hil.scenario.schema import Scenario, TableProgram
@@ -31,9 +32,7 @@ def certificate_of(scenario: Scenario, *, driven: bool = True) -> Certificate:
 
     Of a recorded leader nothing but its limits is known.
     """
-    from estimation.bounds.certificate import certify  # compiled kernels behind it: only for those who ask
-
-    return certify(assumptions_of(scenario, driven=driven))
+    return kept_certificate(assumptions_of(scenario, driven=driven))
 
 
 def assumptions_of(scenario: Scenario, *, driven: bool = True) -> Assumptions:
