@@ -13,6 +13,7 @@ import sys
 import zlib
 from array import array
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 
 import zstandard
 from mcap.data_stream import RecordBuilder
@@ -32,6 +33,8 @@ from mcap.records import (
     SummaryOffset,
 )
 
+from hil.log.index_spool import IndexSpool
+
 MAGIC = b"\x89MCAP0\r\n"
 
 _MESSAGE_HEAD = struct.Struct("<BQHIQQ")
@@ -49,17 +52,20 @@ _FOOTER_BYTES = 20
 
 
 class ChunkedMcap:
-    """An MCAP file in the making: ``emit`` gets whole records, which one after the other are the file."""
+    """An MCAP file in the making: ``emit`` gets whole records, which one after the other are the file.
 
-    def __init__(self, emit: Callable[[bytes], None], profile: str, library: str) -> None:
+    ``folder``: where indexes wait for its end, None for in memory. Where they are lost there is no summary.
+    """
+
+    def __init__(
+        self, emit: Callable[[bytes], None], profile: str, library: str, folder: Path | None = None
+    ) -> None:
         self._emit_bytes = emit
         self._offset = 0
         self._declarations = bytearray()
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
         self._metadata_indexes: list[MetadataIndex] = []
-        # As bytes, since a run of hours has ten a second.
-        self._chunk_indexes = bytearray()
         self._chunks = 0
         self._message_counts: dict[int, int] = {}
         self._span: tuple[int, int] | None = None
@@ -69,6 +75,8 @@ class ChunkedMcap:
         self._entries: dict[int, list[int]] = {}
         self._compressor = zstandard.ZstdCompressor(level=_LEVEL)
         self._emit(MAGIC + _bytes_of([Header(profile=profile, library=library)]))
+        # A run of hours has ten a second.
+        self._chunk_indexes = IndexSpool(folder)
 
     def add_metadata(self, name: str, entries: Mapping[str, str]) -> None:
         """Write a metadata record at once."""
@@ -161,13 +169,17 @@ class ChunkedMcap:
             message_index_offsets=index_offsets,
             message_index_length=end - chunk_bytes,
         )
-        self._chunk_indexes += _bytes_of([index])
+        self._chunk_indexes.add(_bytes_of([index]))
         self._chunks += 1
         self._emit(b"".join(written))
 
     def finish(self) -> None:
         """Write what is still in memory, the summary and the end of the file."""
         self.close_chunk()
+        chunk_indexes = self._chunk_indexes.all()
+        if self._chunk_indexes.lost:
+            self._emit(self.bare_end())
+            return
         # With the summary, at once: where that does not fit the data go on to their end all the same.
         data_end = _bytes_of([DataEnd(data_section_crc=0)])
         summary_start = self._offset + len(data_end)
@@ -175,7 +187,7 @@ class ChunkedMcap:
             (Opcode.SCHEMA, _bytes_of(self._schemas)),
             (Opcode.CHANNEL, _bytes_of(self._channels)),
             (Opcode.STATISTICS, _bytes_of([self._statistics()])),
-            (Opcode.CHUNK_INDEX, bytes(self._chunk_indexes)),
+            (Opcode.CHUNK_INDEX, chunk_indexes),
             (Opcode.METADATA_INDEX, _bytes_of(self._metadata_indexes)),
         ]
         offsets: list[SummaryOffset] = []
@@ -191,6 +203,10 @@ class ChunkedMcap:
         crc = zlib.crc32(footer_head, zlib.crc32(summary))
         footer = Footer(summary_start=summary_start, summary_offset_start=offsets_start, summary_crc=crc)
         self._emit(data_end + summary + _bytes_of([footer]) + MAGIC)
+
+    def close(self) -> None:
+        """Let go of what is kept aside, finished or not."""
+        self._chunk_indexes.close()
 
     @staticmethod
     def bare_end() -> bytes:

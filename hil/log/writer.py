@@ -64,9 +64,14 @@ class LogWriter:
                 f"log {path}: cannot be written ({error.strerror}); give another place"
             ) from None
         try:
-            self._mcap = ChunkedMcap(self._emit, profile="ros2", library=LIBRARY)
+            self._mcap = ChunkedMcap(self._emit, profile="ros2", library=LIBRARY, folder=path.parent)
+        except AbreastError:
+            self._file.close()
+            raise
+        try:
             self.add_metadata(metadata)
         except AbreastError:
+            self._mcap.close()
             self._file.close()
             raise
 
@@ -107,6 +112,7 @@ class LogWriter:
             if not self._failed:
                 self._mcap.finish()
         finally:
+            self._mcap.close()
             self._file.close()
 
     def __enter__(self) -> Self:
