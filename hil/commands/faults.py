@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     "--out",
     type=click.Path(path_type=Path, file_okay=False),
     metavar="DIR",
-    help="Folder for reliability.md and faults.json.",
+    help="Folder for reliability.md, faults.json, and in wrong/ what was said in tries with something wrong.",
 )
 @click.option("--ros", is_flag=True, help="Drivers are reached and judged in ROS 2, by rclpy.")
 @click.option("--add", is_flag=True, help="Add to the tries that the folder of --out has.")
@@ -56,7 +56,7 @@ def command(
     from hil.faults.matrix import faults
     from hil.faults.report import merged
     from hil.faults.ros_ear import refuse_without_ros
-    from hil.faults.session import tried
+    from hil.faults.session import Tries, tried
 
     if as_list:
         print_text("".join(f"{fault.name}\n" for fault in faults()))
@@ -68,7 +68,8 @@ def command(
         refuse_without_ros()
     before = _before(out, ros) if add and out is not None else []
     _leave_on_signals()
-    session = tried(chosen, tries, lambda line: click.echo(line, err=True), _domain() if ros else None)
+    how = Tries(tries, _domain() if ros else None, None if out is None else out / "wrong")
+    session = tried(chosen, how, lambda line: click.echo(line, err=True))
     session.cases = merged(before, session.cases, faults())
     _tell(session, out, as_json=as_json)
     if session.interrupted:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import shutil
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -13,14 +15,18 @@ from hil.faults.attempt import Try, attempt
 from hil.faults.fault import Fault
 from hil.faults.link import NotHereError
 from hil.faults.report import NEVER_TRIED, Skipped
-from hil.faults.tally import Case, worst_of
+from hil.faults.tally import Case, is_wrong, worst_of
 
 
 class Tries(NamedTuple):
-    """How many of each fault, and in which ROS domain drivers hear, None for on the wire."""
+    """How many of each fault, and in which ROS domain drivers hear, None for on the wire.
+
+    ``keep``: folder for what was said and written in tries with something wrong, None for nowhere.
+    """
 
     number: int
-    ros: int | None
+    ros: int | None = None
+    keep: Path | None = None
 
 
 @dataclass(slots=True)
@@ -36,14 +42,11 @@ class Session:
     ros: bool = False
 
 
-def tried(faults: Sequence[Fault], tries: int, say: Callable[[str], None], ros: int | None = None) -> Session:
-    """Try faults, and tell of each by ``say``. Ctrl-C leaves what there is by then.
-
-    ``ros``: a ROS domain in which the drivers hear, None for on the wire.
-    """
-    session = Session(ros=ros is not None)
+def tried(faults: Sequence[Fault], tries: Tries, say: Callable[[str], None]) -> Session:
+    """Try faults, and tell of each by ``say``. Ctrl-C leaves what there is by then."""
+    session = Session(ros=tries.ros is not None)
     try:
-        _try_each(session, faults, Tries(tries, ros), say)
+        _try_each(session, faults, tries, say)
     except KeyboardInterrupt:
         session.interrupted = True
     session.skipped += NEVER_TRIED
@@ -58,7 +61,7 @@ def _try_each(session: Session, faults: Sequence[Fault], tries: Tries, say: Call
             try:
                 # By numbers: a fault's own name in a path is not to pass for the word that names it.
                 folders = [Path(name) / f"{number}-{turn}" for turn in range(tries.number)]
-                done.extend(attempt(fault, folder, tries.ros) for folder in folders)
+                done.extend(_attempted(fault, folder, tries) for folder in folders)
             except NotHereError as error:
                 session.skipped.append(Skipped(fault.name, str(error)))
                 say(f"{number}/{len(faults)} {fault.name}: skipped, {error}")
@@ -67,6 +70,18 @@ def _try_each(session: Session, faults: Sequence[Fault], tries: Tries, say: Call
                 if done:
                     session.cases.append(Case(fault, len(done), worst_of(done)))
             say(f"{number}/{len(faults)} {_told(session.cases[-1])}, {time.monotonic() - begun_s:.0f} s")
+
+
+def _attempted(fault: Fault, folder: Path, tries: Tries) -> Try:
+    """One try; its folder is gone after it, or kept under a name of its own."""
+    try:
+        found = attempt(fault, folder, tries.ros)
+        if tries.keep is not None and is_wrong(found) and not fault.uncovered:
+            places = (tries.keep / f"{fault.name}-{number}" for number in itertools.count(1))
+            shutil.copytree(folder, next(place for place in places if not place.exists()))
+        return found
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _told(case: Case) -> str:
