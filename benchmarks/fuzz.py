@@ -108,7 +108,7 @@ class Listeners:
     def __init__(self, scenario: Scenario, folder: Path, held: ExitStack) -> None:
         links = links_of(scenario)
         self._lab, self._barrier = LabState(scenario), StartBarrier(frozenset({"recorder"}), links)
-        self._present, self.counts = NOBODY, Counter[str]()
+        self._present, self.counts, self._now_s = NOBODY, Counter[str](), 0.0
         self._recorder = Recorder(scenario, folder / "fuzzed.mcap")
         held.callback(self._recorder.close)
         self._recorder.begin(EPOCH_NS)
@@ -121,7 +121,8 @@ class Listeners:
 
     def hear(self, event: Event, now_ns: int) -> None:
         """Let all of them hear it."""
-        self._lab.hear(event, (now_ns - EPOCH_NS) * 1e-9)
+        self._now_s = (now_ns - EPOCH_NS) * 1e-9
+        self._lab.hear(event, self._now_s)
         self.counts["lab_state"] += 1
         if event.topic in self._barrier.subscribes:
             self.counts["start_barrier"] += 1
@@ -138,7 +139,8 @@ class Listeners:
         snapshot = self._monitor.update()
         snapshot.line(1.0, 2.0)
         snapshot.waits_for(["recorder"])
-        told_lines(self._lab, 1.0)
+        for _ in told_lines(self._lab, self._now_s):
+            pass
 
 
 def fuzz(inputs: int, seed: int, *, guarded: bool = False) -> Counter[str]:

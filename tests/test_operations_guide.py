@@ -12,6 +12,9 @@ import click
 import pytest
 
 from hil.command_line import abreast
+from hil.guard.report import node_of
+from hil.scenario.files import load_scenario
+from hil.scenario.links import links_of, node_names
 
 ROOT = Path(__file__).resolve().parent.parent
 UNIT = ROOT / "packaging" / "systemd" / "abreast@.service"
@@ -32,9 +35,10 @@ def test_the_unit_starts_a_daemon_again_a_few_times_and_hears_whether_it_lives()
     assert service["Type"] == "notify"
     assert float(service["WatchdogSec"]) >= 10.0
     assert (service["Restart"], service["RestartPreventExitStatus"]) == ("on-failure", "2")
-    assert int(unit["Unit"]["StartLimitBurst"]) * float(service["RestartSec"]) < float(
-        unit["Unit"]["StartLimitIntervalSec"]
-    )
+    limits = unit["Unit"]
+    burst, each_s = int(limits["StartLimitBurst"]), float(service["RestartSec"])
+    # It tries for a while, and then no more.
+    assert 60.0 <= burst * each_s < float(limits["StartLimitIntervalSec"])
 
 
 def test_systemd_takes_the_unit(tmp_path: Path) -> None:
@@ -73,6 +77,14 @@ def test_each_service_is_a_command_that_there_is(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert parsed(line.replace("$(date +%Y%m%d-%H%M%S)", "now").split()) in line
+
+
+def test_what_is_needed_are_nodes_that_there_are() -> None:
+    (named,) = re.findall(r"--needs (\S+)", GUIDE)
+    links = links_of(load_scenario("turtlebot3"))
+    nodes = {name for daemon in ("recorder", "follower", "leader") for name in node_names(daemon, links)}
+    guards = {node_of(robot) for robot in ("leader", "follower")}
+    assert set(named.split(",")) <= nodes | guards
 
 
 def test_there_are_services_to_look_at() -> None:

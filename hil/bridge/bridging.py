@@ -44,8 +44,10 @@ def run_bridge(
 
     The bridge is made once the wire is there, and is given it. Topics lie where the scenario has them.
     """
-    with joined(endpoints, scenario, "bridge", give_up=lambda: ending.asked) as wire:
-        bridge, service = make_bridge(wire), Service()
+    service = Service()
+    patience = service.patience_s(endpoints.describe())
+    with joined(endpoints, scenario, "bridge", patience, lambda: ending.asked) as wire:
+        bridge = make_bridge(wire)
         try:
             service.ready(time.monotonic())
             on_ready()

@@ -56,11 +56,13 @@ def routes_of(scenario: Scenario) -> tuple[Route, ...]:
         return Route(topic, f"/{layout.name(topic)}", kind, way, reliable, depth, sensed=topic in captured)
 
     first = pairs[0].leader_cmd_vel
+    # One that is emulated has nobody in ROS to listen for it.
+    is_real = scenario.source.emulated != "follower"
     return (
         *(route(topic, "in", SENSOR_DEPTH, reliable=False) for topic in sensed),
         *(replace(route(pair.side, "in", _ORDER_DEPTH), optional=True) for pair in pairs),
         replace(route(first, "out", 1), drives=True),
-        *(replace(route(pair.cmd_vel, "out", 1), drives=True, due=True) for pair in pairs),
+        *(replace(route(pair.cmd_vel, "out", 1), drives=True, due=is_real) for pair in pairs),
         route(DIAGNOSTICS, "out", _ORDER_DEPTH),
         route(STOP, "both", _ORDER_DEPTH),
     )

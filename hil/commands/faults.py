@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import sys
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING
 
 import click
 
-from hil.errors import UsageError
+from hil.commands.outputs import OutputFolder
+from hil.errors import CheckFailedError, UsageError
 from hil.log.report_json import print_json, print_text, results_apart
 
 if TYPE_CHECKING:
     from hil.faults.fault import Fault
     from hil.faults.session import Session
-    from hil.faults.tally import Case
 
 
 @click.command("faults")
@@ -30,7 +28,7 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object on stdout.")
 @click.option(
     "--out",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=OutputFolder(),
     metavar="DIR",
     help="Folder for reliability.md, faults.json, and in wrong/ what was said in tries with something wrong.",
 )
@@ -54,9 +52,10 @@ def command(
     fault. Ctrl-C leaves what was tried by then.
     """
     from hil.faults.matrix import faults
-    from hil.faults.report import merged
+    from hil.faults.report import merged, skipped_of
     from hil.faults.ros_ear import refuse_without_ros
-    from hil.faults.session import Tries, tried
+    from hil.faults.session import Session, Tries, tried
+    from hil.live.interrupts import interrupt_on_signals
 
     if as_list:
         print_text("".join(f"{fault.name}\n" for fault in faults()))
@@ -66,14 +65,17 @@ def command(
         raise UsageError("--add: adds to what is in a folder; give --out DIR with it")
     if ros:
         refuse_without_ros()
-    before = _before(out, ros) if add and out is not None else []
-    _leave_on_signals()
+    before = _before(out, ros) if add and out is not None else Session(ros=ros)
+    interrupt_on_signals()
     how = Tries(tries, _domain() if ros else None, None if out is None else out / "wrong")
     session = tried(chosen, how, lambda line: click.echo(line, err=True))
-    session.cases = merged(before, session.cases, faults())
+    session.cases = merged(before.cases, session.cases, faults())
+    session.skipped = skipped_of([*before.skipped, *session.skipped], session.cases)
     _tell(session, out, as_json=as_json)
     if session.interrupted:
         raise KeyboardInterrupt
+    if session.broken:
+        raise CheckFailedError(session.broken)
     if any(case.failed for case in session.cases):
         sys.exit(1)
 
@@ -83,23 +85,28 @@ def _domain() -> int:
     return 40 + os.getpid() % 60
 
 
-def _before(out: Path, ros: bool) -> list[Case]:
+def _before(out: Path, ros: bool) -> Session:
     """What a folder has of before, of drivers that hear where they do now."""
     from hil.faults.matrix import faults
-    from hil.faults.report import cases_of
+    from hil.faults.report import Skipped, cases_of
+    from hil.faults.session import Session
 
     place = out / "faults.json"
     if not place.exists():
-        return []
+        return Session(ros=ros)
     try:
         result = json.loads(place.read_text(encoding="utf-8"))
-        if result["ros"] == ros:
-            return cases_of(result, faults())
+        skipped = [Skipped(**each) for each in result["skipped"]]
+        found = Session(cases_of(result, faults()), skipped, ros=result["ros"])
     except OSError as error:
         raise UsageError(f"--add: {place}: {error.strerror}; leave it out, or give another --out") from None
     except (ValueError, KeyError, TypeError):
         raise UsageError(f"--add: {place} is no result of this command; leave it out, or move it") from None
-    raise UsageError(f"--add: {place} is of drivers {'on the wire' if ros else 'in ROS'}; give another --out")
+    if found.ros != ros:
+        raise UsageError(
+            f"--add: {place} is of drivers {'on the wire' if ros else 'in ROS'}; give another --out"
+        )
+    return found
 
 
 def _chosen(known: tuple[Fault, ...], only: tuple[str, ...]) -> list[Fault]:
@@ -107,16 +114,6 @@ def _chosen(known: tuple[Fault, ...], only: tuple[str, ...]) -> list[Fault]:
         if not any(fault.name.startswith(name) for fault in known):
             raise UsageError(f"--only {name!r}: no fault begins so; abreast faults --list names all")
     return [fault for fault in known if not only or any(fault.name.startswith(name) for name in only)]
-
-
-def _leave_on_signals() -> None:
-    """End as by Ctrl-C: else what was started and mounted would stay."""
-
-    def leave(_number: int, _frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, leave)
 
 
 def _tell(session: Session, out: Path | None, *, as_json: bool) -> None:
@@ -127,14 +124,15 @@ def _tell(session: Session, out: Path | None, *, as_json: bool) -> None:
 
     result = as_result(session.cases, session.skipped, ros=session.ros)
     page = as_markdown(session.cases, session.skipped, ros=session.ros)
-    if out is not None:
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-            write_json(result, out / "faults.json")
-            write_text_aside(out / "reliability.md", page)
-        except OSError as error:
-            raise UsageError(f"--out {out}: {error.strerror or error}; give another folder") from None
     if as_json:
         print_json(result)
     else:
         print_text(page[page.index("|") :] if "|" in page else page)
+    if out is None or not session.cases:
+        return
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        write_json(result, out / "faults.json")
+        write_text_aside(out / "reliability.md", page)
+    except OSError as error:
+        raise UsageError(f"--out {out}: {error.strerror or error}; give another folder") from None

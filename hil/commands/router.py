@@ -31,6 +31,7 @@ def command(secure: Path | None, listen: str | None, zenoh_config: Path | None, 
     from hil.live.daemon import Ending
     from hil.live.service import Service
     from hil.wire.link_watch import links_said
+    from hil.wire.refused_links import refused_links_said
     from hil.wire.role_keys import RoleKeys
     from hil.wire.roles import ROUTER
     from hil.wire.session import Endpoints, NoRouterError, close_session, open_session, refuse_deaf
@@ -46,21 +47,22 @@ def command(secure: Path | None, listen: str | None, zenoh_config: Path | None, 
     ending.on_signals()
     if tethered:
         ending.on_parent_gone()
-    try:
-        session = open_session(endpoints, give_up=lambda: ending.asked)
-    except NoRouterError as error:
-        raise UsageError(str(error)) from None
-    try:
-        how = f"by the keys of {secure}" if secure else "open to all who reach it"
-        with links_said(session, _say):
-            service.ready(time.monotonic())
-            _say(f"ready, {endpoints.describe()}, {how}")
-            while not ending.asked:
-                asked.wait(_LONGEST_WAIT_S)
-                service.goes_round(time.monotonic())
-            service.ends()
-    finally:
-        close_session(session)
+    with refused_links_said(_say):
+        try:
+            session = open_session(endpoints, give_up=lambda: ending.asked)
+        except NoRouterError as error:
+            raise UsageError(str(error)) from None
+        try:
+            how = f"by the keys of {secure}" if secure else "open to all who reach it"
+            with links_said(session, _say):
+                service.ready(time.monotonic())
+                _say(f"ready, {endpoints.describe()}, {how}")
+                while not ending.asked:
+                    asked.wait(_LONGEST_WAIT_S)
+                    service.goes_round(time.monotonic())
+                service.ends()
+        finally:
+            close_session(session)
 
 
 def _say(line: str) -> None:

@@ -10,8 +10,10 @@ import click
 
 from hil.commands.outputs import OutputFolder, new_folder
 from hil.commands.seconds import Seconds
-from hil.errors import CheckFailedError
+from hil.errors import CheckFailedError, UsageError
+from hil.live.interrupts import interrupt_on_signals
 from hil.log.report_json import print_json, print_text, results_apart, write_json
+from hil.log.rotating_log import log_place
 from hil.scenario.files import load_scenario, refuse_unrunnable
 
 _HOUR_S = 3600.0
@@ -47,17 +49,26 @@ def command(
     chosen = load_scenario(scenario, overrides)
     refuse_unrunnable(chosen)
     folder = (out or new_folder(f"soak-{chosen.name}")).absolute()
+    log = log_place(folder / "run.mcap", chosen.recorder)
+    for there in (log, folder / "soak.json"):
+        if there.exists():
+            raise UsageError(f"--out {folder}: has a {there.name} already; give another folder")
+    interrupt_on_signals()
     arguments = [scenario, "--duration", repr(duration), *(["--apart"] if apart else [])]
     for override in overrides:
         arguments += ["--set", override]
     run = watched_run(arguments, folder, _Progress(duration).say)
-    result = as_result(chosen.name, run, verified_log(folder / "run.mcap"))
+    if run.code == UsageError.exit_code:
+        raise UsageError(run.said.removeprefix("abreast: "))
+    result = as_result(chosen.name, run, None if run.interrupted else verified_log(log))
     if folder.is_dir():
         write_json(result, folder / "soak.json")
     if as_json:
         print_json(result)
     else:
         print_text("".join(f"{line}\n" for line in _lines(result)))
+    if run.interrupted:
+        raise KeyboardInterrupt
     if result["failed"]:
         raise CheckFailedError("; ".join(result["failed"]))
 
@@ -85,6 +96,8 @@ def _lines(result: dict[str, Any]) -> list[str]:
             f"  cycles {cycles['count']}, {cycles['late']} later than {cycles['limit_ms']:.1f} ms, "
             f"the longest {cycles['longest_ms']:.1f} ms"
         )
+    if result["findings"]:
+        lines.append(f"  findings: {', '.join(result['findings'])}")
     if verify := result["verify"]:
         lines.append(f"  replay: {verify['compared']} compared, {verify['differ']} differ")
     return lines

@@ -51,11 +51,14 @@ def command(
 
     if needs is not None and not (once or as_json):
         raise UsageError(f"--needs {needs}: is for one look; give --once or --json with it")
+    wanted = [name.strip() for name in needs.split(",")] if needs is not None else []
+    if not all(wanted):
+        raise UsageError(f"--needs {needs!r}: expected names of nodes, by commas")
     chosen = load_scenario(scenario, overrides)
     state = LabState(chosen)
     clock = time.monotonic
     endpoints = endpoints_of(connect, None, zenoh_config, secure, "viewer")
-    with joined(endpoints, chosen, patience=3.0) as wire, suppress(KeyboardInterrupt):
+    with joined(endpoints, chosen, patience=3.0) as wire:
         wire.subscribe(state.topics, shown=False)
         take = wire.inbox.take
         hear_for(state, take, clock, clock() + _FIRST_LOOK_S)
@@ -64,11 +67,10 @@ def command(
         elif once:
             Console().print(_table(state, clock()))
         if once or as_json:
-            wanted = [name for name in (needs or "").split(",") if name]
             if unwell := state.unwell(wanted, clock()):
                 raise CheckFailedError("; ".join(unwell))
             return
-        with Live(_table(state, clock()), auto_refresh=False) as shown:
+        with suppress(KeyboardInterrupt), Live(_table(state, clock()), auto_refresh=False) as shown:
             while True:
                 hear_for(state, take, clock, clock() + _REFRESH_S)
                 shown.update(_table(state, clock()), refresh=True)

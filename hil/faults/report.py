@@ -94,6 +94,13 @@ def merged(before: Sequence[Case], now: Sequence[Case], faults: Sequence[Fault])
     return [found[fault.name] for fault in faults if fault.name in found]
 
 
+def skipped_of(skipped: Sequence[Skipped], cases: Sequence[Case]) -> list[Skipped]:
+    """What was skipped, each once, but what was tried after all."""
+    tried = {case.fault.name for case in cases}
+    whys = {each.fault: each for each in skipped if each.fault not in tried}
+    return list(whys.values())
+
+
 def as_markdown(cases: Sequence[Case], skipped: Sequence[Skipped], *, ros: bool = False) -> str:
     """The page; ``ros``: drivers heard in ROS."""
     covered = [case for case in cases if not case.fault.uncovered]

@@ -7,10 +7,11 @@ import shutil
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
+from hil.errors import AbreastError
 from hil.faults.attempt import Try, attempt
 from hil.faults.fault import Fault
 from hil.faults.link import NotHereError
@@ -33,12 +34,13 @@ class Tries(NamedTuple):
 class Session:
     """What came of faults, what could not be tried and why, and whether it was broken off by Ctrl-C.
 
-    ``ros``: drivers heard in ROS.
+    ``broken``: what made the rest impossible, in words. ``ros``: drivers heard in ROS.
     """
 
     cases: list[Case] = field(default_factory=list)
     skipped: list[Skipped] = field(default_factory=list)
     interrupted: bool = False
+    broken: str = ""
     ros: bool = False
 
 
@@ -49,6 +51,8 @@ def tried(faults: Sequence[Fault], tries: Tries, say: Callable[[str], None]) -> 
         _try_each(session, faults, tries, say)
     except KeyboardInterrupt:
         session.interrupted = True
+    except (AbreastError, OSError) as error:
+        session.broken = " ".join(str(error).split())
     session.skipped += NEVER_TRIED
     return session
 
@@ -76,10 +80,16 @@ def _attempted(fault: Fault, folder: Path, tries: Tries) -> Try:
     """One try; its folder is gone after it, or kept under a name of its own."""
     try:
         found = attempt(fault, folder, tries.ros)
-        if tries.keep is not None and is_wrong(found) and not fault.uncovered:
-            places = (tries.keep / f"{fault.name}-{number}" for number in itertools.count(1))
-            shutil.copytree(folder, next(place for place in places if not place.exists()))
-        return found
+        if tries.keep is None or not is_wrong(found) or fault.uncovered:
+            return found
+        places = (tries.keep / f"{fault.name}-{number}" for number in itertools.count(1))
+        place = next(place for place in places if not place.exists())
+        try:
+            shutil.copytree(folder, place)
+        except OSError as error:
+            # What was found counts all the same.
+            return replace(found, wrong=(*found.wrong, f"cannot be kept at {place}: {error}"))
+        return replace(found, wrong=(*found.wrong, f"kept at {place}"))
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

@@ -141,7 +141,9 @@ def run_daemon(
     scenario has them. Of what comes faster than any sane sender sends only so much is taken in, except by a
     thorough worker. Returns how many arrivals found the inbox full and were dropped.
     """
-    with joined(endpoints, scenario, presence.name, give_up=lambda: ending.asked) as wire:
+    service = Service()
+    patience = service.patience_s(endpoints.describe())
+    with joined(endpoints, scenario, presence.name, patience, lambda: ending.asked) as wire:
         ending.notify(wire.wake)
         worker = make_worker()
         worker.begin(time.time_ns())
@@ -154,7 +156,6 @@ def run_daemon(
         gc.freeze()
         senders = SenderWatch(single_topics(scenario))
         watch = _reports_on(wire, presence, senders)
-        service = Service()
         service.ready(time.monotonic())
         on_ready()
         try:

@@ -116,7 +116,8 @@ class Recorder:
         gone, refused = self._watch.gone(), self._sync.failure
         if refused:
             refused = f"log {self._watch.path}: the disk does not keep what is written ({refused})"
-        seen = "; ".join(filter(None, (gone, refused, self._scarce)))
+        lost = f"the disk does not keep the index of {self._watch.path}" if self._log.log.index_lost else ""
+        seen = "; ".join(filter(None, (gone, refused, self._scarce, lost)))
         values = {
             "messages": self._log.messages,
             **named_counts("malformed", self._malformed),

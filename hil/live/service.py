@@ -7,6 +7,7 @@ import math
 from hil.guard.sd_notify import sd_notify
 
 _EACH_S = 0.5
+_PATIENCE_S = 10.0
 
 
 class Service:
@@ -15,9 +16,14 @@ class Service:
     def __init__(self) -> None:
         self._due_s = math.inf
 
+    def patience_s(self, router: str) -> float:
+        """For how long [s] a router, in words, is waited for: a service may begin before it."""
+        is_service = sd_notify(f"STATUS=waits for {router}")
+        return math.inf if is_service else _PATIENCE_S
+
     def ready(self, now_s: float) -> None:
         """The daemon takes part, at a time of the monotonic clock [s]."""
-        sd_notify("READY=1")
+        sd_notify("READY=1\nSTATUS=takes part")
         self._due_s = now_s
 
     def goes_round(self, now_s: float) -> None:

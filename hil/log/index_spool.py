@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import io
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
+
+_BLOCK_BYTES = 1 << 20
 
 
 class IndexSpool:
@@ -33,16 +36,21 @@ class IndexSpool:
         except OSError:
             self._lose()
 
-    def all(self) -> bytes:
-        """All that was kept; nothing where it is lost."""
+    def size(self) -> int:
+        """How many bytes there are to be had; 0 where they are lost."""
         if not self.lost:
             try:
                 self._file.flush()
-                self._file.seek(0)
-                return self._file.read()
+                return self._file.tell()
             except OSError:
                 self._lose()
-        return b""
+        return 0
+
+    def blocks(self) -> Iterator[bytes]:
+        """All that was kept, piece by piece; raises :class:`OSError` where the disk does not give it back."""
+        self._file.seek(0)
+        while block := self._file.read(_BLOCK_BYTES):
+            yield block
 
     def close(self) -> None:
         """Let go of the file; nothing can be kept after that."""

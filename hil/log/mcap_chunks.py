@@ -173,36 +173,42 @@ class ChunkedMcap:
         self._chunks += 1
         self._emit(b"".join(written))
 
+    @property
+    def index_lost(self) -> bool:
+        """Whether the log will have no summary, as the disk did not keep what goes into it."""
+        return self._chunk_indexes.lost
+
     def finish(self) -> None:
         """Write what is still in memory, the summary and the end of the file."""
         self.close_chunk()
-        chunk_indexes = self._chunk_indexes.all()
-        if self._chunk_indexes.lost:
+        index_bytes = self._chunk_indexes.size()
+        if self.index_lost:
             self._emit(self.bare_end())
             return
-        # With the summary, at once: where that does not fit the data go on to their end all the same.
         data_end = _bytes_of([DataEnd(data_section_crc=0)])
         summary_start = self._offset + len(data_end)
-        groups: list[tuple[Opcode, bytes]] = [
-            (Opcode.SCHEMA, _bytes_of(self._schemas)),
-            (Opcode.CHANNEL, _bytes_of(self._channels)),
-            (Opcode.STATISTICS, _bytes_of([self._statistics()])),
-            (Opcode.CHUNK_INDEX, chunk_indexes),
-            (Opcode.METADATA_INDEX, _bytes_of(self._metadata_indexes)),
+        groups: list[tuple[Opcode, Iterable[bytes], int]] = [
+            _group(Opcode.SCHEMA, self._schemas),
+            _group(Opcode.CHANNEL, self._channels),
+            _group(Opcode.STATISTICS, [self._statistics()]),
+            (Opcode.CHUNK_INDEX, self._chunk_indexes.blocks(), index_bytes),
+            _group(Opcode.METADATA_INDEX, self._metadata_indexes),
         ]
+        self._emit(data_end)
         offsets: list[SummaryOffset] = []
-        summary = b""
-        for opcode, data in groups:
-            if data:
-                start = summary_start + len(summary)
-                offsets.append(SummaryOffset(group_opcode=opcode, group_start=start, group_length=len(data)))
-                summary += data
-        offsets_start = summary_start + len(summary)
-        summary += _bytes_of(offsets)
+        crc = 0
+        for opcode, blocks, length in groups:
+            if length:
+                start = self._offset
+                offsets.append(SummaryOffset(group_opcode=opcode, group_start=start, group_length=length))
+                for block in blocks:
+                    self._emit(block)
+                    crc = zlib.crc32(block, crc)
+        offsets_start, told = self._offset, _bytes_of(offsets)
         footer_head = _FOOTER_HEAD.pack(Opcode.FOOTER, _FOOTER_BYTES, summary_start, offsets_start)
-        crc = zlib.crc32(footer_head, zlib.crc32(summary))
+        crc = zlib.crc32(footer_head, zlib.crc32(told, crc))
         footer = Footer(summary_start=summary_start, summary_offset_start=offsets_start, summary_crc=crc)
-        self._emit(data_end + summary + _bytes_of([footer]) + MAGIC)
+        self._emit(told + _bytes_of([footer]) + MAGIC)
 
     def close(self) -> None:
         """Let go of what is kept aside, finished or not."""
@@ -240,6 +246,12 @@ class ChunkedMcap:
     def _emit(self, data: bytes) -> None:
         self._emit_bytes(data)
         self._offset += len(data)
+
+
+def _group(opcode: Opcode, records: Iterable[McapRecord]) -> tuple[Opcode, Iterable[bytes], int]:
+    """Records of the summary: their kind, their bytes and how many these are."""
+    data = _bytes_of(records)
+    return opcode, [data], len(data)
 
 
 def _message_index(channel_id: int, entries: Sequence[int]) -> bytes:

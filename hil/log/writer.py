@@ -55,6 +55,7 @@ class LogWriter:
         self._schema_ids: dict[str, int] = {}
         self._channel_ids: dict[tuple[str, str], int] = {}
         self._failed = False
+        self._whole_bytes: int | None = None
         try:
             self._file = path.open("xb", buffering=0)
         except FileExistsError:
@@ -99,6 +100,11 @@ class LogWriter:
         """Descriptor of the file, for as long as it is open."""
         return self._file.fileno()
 
+    @property
+    def index_lost(self) -> bool:
+        """Whether the file will end without a summary, as the disk did not keep what goes into it."""
+        return self._mcap.index_lost
+
     def flush(self) -> None:
         """Hand everything written so far to the operating system: it then survives a kill of the process."""
         self._mcap.close_chunk()
@@ -110,6 +116,9 @@ class LogWriter:
             return
         try:
             if not self._failed:
+                self._mcap.close_chunk()
+                # Where the summary does not fit, the data go on to their end all the same.
+                self._whole_bytes = self.bytes
                 self._mcap.finish()
         finally:
             self._mcap.close()
@@ -178,8 +187,9 @@ class LogWriter:
     def _end_early(self) -> bool:
         """End the file behind the last records that are whole; whether the disk has room for that."""
         try:
-            self._file.truncate(self.bytes)
-            self._file.seek(self.bytes)
+            whole_bytes = self.bytes if self._whole_bytes is None else self._whole_bytes
+            self._file.truncate(whole_bytes)
+            self._file.seek(whole_bytes)
             self._put(ChunkedMcap.bare_end())
         except OSError:
             return False

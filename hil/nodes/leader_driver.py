@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 from controllers.resolution import NO_REMAINDER, Resolution
 from formation.pose import STANDSTILL, Motion
+from hil.nodes import deaf_robots
+from hil.nodes.deaf_robots import DeafRobots
 from hil.nodes.node import Counts, Outgoing, counted, diagnostics, is_due, named_counts, no_counts, outgoing
 from hil.nodes.start_barrier import NOBODY, Attendance, StartBarrier
 from hil.scenario.links import links_of
@@ -34,14 +36,16 @@ class DriverState:
     """What the driver knows; it changes in place.
 
     ``counting_ns``: when the barrier opened, None while it is closed; ``since_ns``: when the leader set off.
-    ``over``: why it drives no more, empty before. ``heard_s``: at which ``observed_s`` each needed node was
-    heard last; that time does not run while we stood still ourselves. ``remainder``: what rounding left.
+    ``deaf``: who says that a robot does not listen. ``over``: why it drives no more, empty before.
+    ``heard_s``: at which ``observed_s`` each needed node was heard last; that time does not run while we
+    stood still ourselves. ``remainder``: what rounding left.
     """
 
     next_tick_ns: int
     next_diagnostics_ns: int
     ticked_ns: int
     present: Attendance = NOBODY
+    deaf: DeafRobots = field(default_factory=dict)
     counting_ns: int | None = None
     since_ns: int | None = None
     over: str = ""
@@ -54,9 +58,9 @@ class DriverState:
 class LeaderDriver:
     """Step of the leader's daemon.
 
-    The program begins a countdown [s] after the start barrier has opened, which begins anew if somebody
-    reports a problem in the meantime. It ends with the run's duration, with a stop, or when a daemon that is
-    needed falls silent; the leader stands then, and for good.
+    The program begins a countdown [s] after the start barrier has opened and nobody says that a robot does
+    not listen; it begins anew if somebody reports a problem in the meantime. It ends with the run's duration,
+    with a stop, or when a daemon that is needed falls silent; the leader stands then, and for good.
     """
 
     name = NAME
@@ -84,7 +88,7 @@ class LeaderDriver:
     def step(self, state: DriverState, event: Event, now_ns: int) -> tuple[DriverState, tuple[Outgoing, ...]]:
         """Take in a report, a follower's command or a stop; at a tick and at a stop the leader is told."""
         if event.topic and event.topic != topics.STOP:
-            self._hear(state, event)
+            self._hear(state, event, now_ns)
             return state, ()
         if event.topic:
             state.over = state.over or f"stopped: {stop_reason(event.payload)}"
@@ -112,18 +116,20 @@ class LeaderDriver:
         if state.over:
             return state.over
         if state.counting_ns is None:
-            return self.barrier.waits_for(state.present)
+            missing = self.barrier.waits_for(state.present)
+            return missing or deaf_robots.waits_for(state.deaf, now_ns)
         return f"sets off in {max(0, state.counting_ns + self._countdown_ns - now_ns) * _NS:.1f} s"
 
-    def _hear(self, state: DriverState, event: Event) -> None:
+    def _hear(self, state: DriverState, event: Event, now_ns: int) -> None:
         try:
             state.present = self.barrier.after(state.present, event)
         except MalformedPayloadError:
             state.refused = counted(state.refused, "malformed")
             return
         if event.topic == topics.DIAGNOSTICS:
-            said = decode_as(event.payload, msg.DiagnosticArray).status
-            names = {status.name.removeprefix("abreast/") for status in said} & self.barrier.needs
+            report = decode_as(event.payload, msg.DiagnosticArray)
+            state.deaf = deaf_robots.with_report(state.deaf, report, now_ns)
+            names = {status.name.removeprefix("abreast/") for status in report.status} & self.barrier.needs
             state.heard_s |= dict.fromkeys(names, state.observed_s)
 
     def _look(self, state: DriverState, now_ns: int) -> None:
@@ -133,7 +139,8 @@ class LeaderDriver:
         if state.over:
             return
         if state.since_ns is None:
-            if was_set_back or not self.barrier.is_open(state.present):
+            held_up = not self.barrier.is_open(state.present) or deaf_robots.waits_for(state.deaf, now_ns)
+            if was_set_back or held_up:
                 state.counting_ns = None
             elif state.counting_ns is None:
                 state.counting_ns = now_ns

@@ -10,24 +10,16 @@ from hil.wire import message_types as msg
 from hil.wire import topics
 from hil.wire.drive_message import drive_type
 from hil.wire.events import Event
-from hil.wire.finding_keys import PREFIX
 from hil.wire.messages import decode, decode_as
 from hil.wire.topics import link_topics
-
-_MOST_DEAF = 64
-"""Reports of deaf robots that are kept: anybody may report under any name."""
 
 
 @dataclass(frozen=True, slots=True)
 class Attendance:
-    """Who is there: ``well``, nodes whose last report has no problem; ``commanded``, followers by place.
-
-    ``deaf``: nodes whose last report says that nobody listens to a robot's commands.
-    """
+    """Who is there: ``well``, nodes whose last report has no problem; ``commanded``, followers by place."""
 
     well: frozenset[str] = frozenset()
     commanded: frozenset[int] = frozenset()
-    deaf: frozenset[str] = frozenset()
 
     def with_command(self, place: int) -> Attendance:
         """The same once a command has reached a follower, whose place counts from 1."""
@@ -66,20 +58,17 @@ class StartBarrier:
 
         Raises :class:`~hil.wire.messages.MalformedPayloadError` for a payload that is none.
         """
-        statuses = decode_as(report, msg.DiagnosticArray).status
-        said = {status.name.removeprefix("abreast/"): status for status in statuses}
-        well = {name for name, status in said.items() if status.level == 0} & self.needs
-        deaf = {name for name, status in said.items() if _says_deaf(name, status)}
-        now_well = (present.well - said.keys()) | well
-        now_deaf = frozenset(sorted((present.deaf - said.keys()) | deaf)[:_MOST_DEAF])
-        if now_well == present.well and now_deaf == present.deaf:
-            return present
-        return replace(present, well=now_well, deaf=now_deaf)
+        said = {
+            status.name.removeprefix("abreast/"): status.level == 0
+            for status in decode_as(report, msg.DiagnosticArray).status
+        }
+        well = {name for name, is_well in said.items() if is_well} & self.needs
+        now = (present.well - said.keys()) | well
+        return present if now == present.well else replace(present, well=now)
 
     def is_open(self, present: Attendance) -> bool:
         """Whether the leader may set off."""
-        everybody = present.well >= self.needs and len(present.commanded) == len(self._followers)
-        return everybody and not present.deaf
+        return present.well >= self.needs and len(present.commanded) == len(self._followers)
 
     def waits_for(self, present: Attendance) -> str:
         """What is missing, in words; empty for nothing."""
@@ -92,11 +81,4 @@ class StartBarrier:
                 for place, follower in enumerate(self._followers, start=1)
                 if place not in present.commanded
             ]
-        missing += [f"a robot to listen, of which {name} tells" for name in sorted(present.deaf)]
         return f"waiting for {', '.join(missing)}" if missing else ""
-
-
-def _says_deaf(name: str, status: msg.DiagnosticStatus) -> bool:
-    """Whether a report says that a robot does not listen; a controller's is on how one moves, not on that."""
-    node = name.partition("/")[0]
-    return node != "controller" and any(value.key == f"{PREFIX}deaf_robot" for value in status.values)

@@ -28,7 +28,7 @@ def kept_certificate(given: Assumptions) -> Certificate:
     place = _place(given)
     if place is None:
         return certify(given)
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
         return _certificate(json.loads(place.read_text(encoding="utf-8")))
     found = certify(given)
     # Whatever keeps it from being kept, it is there.
@@ -65,9 +65,14 @@ def _keep(place: Path, found: Certificate) -> None:
     }
     text = json.dumps({"velocity_error": found.velocity_error, "claims": claims})
     # Others may look meanwhile: it is whole or not there.
-    with tempfile.NamedTemporaryFile("w", dir=place.parent, suffix=".part", delete=False) as file:
-        file.write(text)
-    os.replace(file.name, place)
-    kept = sorted(place.parent.glob("certificate-*.json"), key=lambda each: each.stat().st_mtime)
+    descriptor, part = tempfile.mkstemp(prefix="certificate-", suffix=".json.part", dir=place.parent)
+    try:
+        with os.fdopen(descriptor, "w") as file:
+            file.write(text)
+        os.replace(part, place)
+    except OSError:
+        os.unlink(part)
+        raise
+    kept = sorted(place.parent.glob("certificate-*"), key=lambda each: each.stat().st_mtime)
     for old in kept[:-_MOST]:
         old.unlink(missing_ok=True)

@@ -69,7 +69,7 @@ def _failures(
     run: WatchedRun, processes: list[dict[str, Any]], cycles: dict[str, Any], verified: Verification | None
 ) -> list[str]:
     failed = []
-    if run.code:
+    if run.code and not run.interrupted:
         failed.append(f"the run ended with exit code {run.code}: {run.said}")
     for each in processes:
         growth = each["growth_mb_h"]
@@ -77,12 +77,16 @@ def _failures(
             failed.append(
                 f"{each['name']} grows by {growth:.2f} MB an hour, expected {GROWTH_MB_H:g} at most"
             )
-    if cycles and cycles["late"] > LATE_SHARE * cycles["count"]:
+    if not cycles:
+        failed.append("there are no cycles to judge")
+    elif cycles["late"] > LATE_SHARE * cycles["count"]:
         failed.append(
             f"{cycles['late']} of {cycles['count']} cycles were late, expected {LATE_SHARE:g} of them at most"
         )
     if verified is None:
         failed.append("there is no log to verify")
-    elif verified.code or verified.differ:
+    elif verified.differ:
         failed.append(f"{verified.differ} of {verified.compared} outputs differ in a replay of the log")
+    elif verified.code:
+        failed.append(f"a replay of the log ended with exit code {verified.code}: {verified.said}")
     return failed

@@ -12,16 +12,17 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """How a replay of a log went: its exit code, outputs compared, and those that differ."""
+    """How a replay of a log went: its exit code, outputs compared and that differ, and what it said last."""
 
     code: int
     compared: int
     differ: int
+    said: str = ""
 
 
 def verified_log(log: Path) -> Verification | None:
     """Replay a log and compare; None where there is none."""
-    if not log.is_file():
+    if not log.exists():
         return None
     command = [sys.executable, "-m", "hil", "replay", str(log), "--verify", "--json"]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
@@ -31,4 +32,5 @@ def verified_log(log: Path) -> Verification | None:
         done.returncode,
         sum(each["compared"] for each in counts),
         sum(each["mismatched"] for each in counts),
+        (done.stderr.strip().splitlines() or [""])[-1],
     )

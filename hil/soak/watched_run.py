@@ -18,7 +18,6 @@ from hil.soak.memory import Sample
 
 _EACH_S = 5.0
 _LOOK_S = 0.2
-_PATIENCE_S = 60.0
 
 SUPERVISOR = "run"
 """What the process of the supervisor is called, which is the router too."""
@@ -28,13 +27,14 @@ SUPERVISOR = "run"
 class WatchedRun:
     """How a run ended: its exit code, its summary (empty where it told none) and what it said at its end.
 
-    ``memory``: samples of each of its processes, by its name.
+    ``memory``: samples of each of its processes, by its name. ``interrupted``: by Ctrl-C, before its time.
     """
 
     code: int
     summary: dict[str, Any]
     said: str
     memory: dict[str, list[Sample]]
+    interrupted: bool = False
 
 
 def watched_run(arguments: Sequence[str], folder: Path, say: Callable[[float, str], None]) -> WatchedRun:
@@ -50,10 +50,11 @@ def watched_run(arguments: Sequence[str], folder: Path, say: Callable[[float, st
         process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=told, stderr=words, start_new_session=True
         )
-        begun_s = time.monotonic()
+        interrupted = False
         try:
-            _sample(process, folder, begun_s, memory, say)
+            _sample(process, folder, time.monotonic(), memory, say)
         except KeyboardInterrupt:
+            interrupted = True
             process.send_signal(signal.SIGINT)
         finally:
             code = _ended(process)
@@ -61,7 +62,8 @@ def watched_run(arguments: Sequence[str], folder: Path, say: Callable[[float, st
         words.seek(0)
         result = told.read().decode(errors="replace").strip()
         lines = words.read().decode(errors="replace").strip().splitlines()
-    return WatchedRun(code, json.loads(result) if result else {}, lines[-1] if lines else "", memory)
+    summary = json.loads(result) if result else {}
+    return WatchedRun(code, summary, lines[-1] if lines else "", memory, interrupted)
 
 
 def _sample(
@@ -101,9 +103,10 @@ def _processes(folder: Path) -> dict[str, int]:
 
 
 def _ended(process: subprocess.Popen[bytes]) -> int:
-    """Exit code of a run that is at its end; one that does not end is killed."""
+    """Exit code of a run that is at its end: it may have hours to judge. A further Ctrl-C kills it."""
     try:
-        return process.wait(_PATIENCE_S)
-    except subprocess.TimeoutExpired:
+        return process.wait()
+    except KeyboardInterrupt:
+        # Its daemons end with it.
         process.kill()
         return process.wait()

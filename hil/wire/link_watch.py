@@ -16,10 +16,8 @@ Say = Callable[[str], None]
 def links_said(session: zenoh.Session, say: Say) -> Iterator[None]:
     """Say of everybody who comes and goes who it is and from where, for as long as the block lasts.
 
-    Whoever is refused gets no link and is not said: that is in Zenoh's own log only, which the variable
-    ``RUST_LOG`` brings to stderr (``RUST_LOG=zenoh_link_tls=warn``).
+    Whoever is refused gets no link and is not said here (:mod:`hil.wire.refused_links`).
     """
-    zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]
 
     def tell(event: zenoh.LinkEvent) -> None:
         how = "came" if event.kind == zenoh.SampleKind.PUT else "went"

@@ -28,6 +28,8 @@ def test_sensors_come_in_best_effort_and_commands_go_out_one_at_a_time() -> None
     assert (driven.way, driven.reliable, driven.depth, driven.drives) == ("out", True, 1, True)
     # Who drives the leader by hand has a robot that may be deaf to us.
     assert (found["/leader/cmd_vel"].drives, found["/leader/cmd_vel"].due, driven.due) == (True, False, True)
+    # Nor is anybody in ROS to listen for a follower that is emulated.
+    assert not routes("source.emulated=follower")["/follower/cmd_vel"].due
     assert (found["/stop"].way, found["/diagnostics"].way) == ("both", "out")
 
 

@@ -92,7 +92,8 @@ def test_keys_are_made_used_and_told_apart(tmp_path: Path) -> None:
         assert router.stderr is not None
         said = router.stderr.read()
     assert "viewer came, from tls/127.0.0.1:" in said
-    assert "somebody" not in said
+    assert "somebody came" not in said
+    assert "refused somebody who showed no certificate of this lab: received fatal alert" in said
 
 
 @pytest.mark.parametrize(

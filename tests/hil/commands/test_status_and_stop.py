@@ -171,11 +171,18 @@ def test_one_look_ends_with_1_unless_all_that_is_needed_is_heard_and_well(lab: t
     )
     with again(wire, *said):
         assert ran(*look, "recorder").returncode == 0
-        done = ran(*look, "recorder,estimator,controller,leader")
+        done = ran(*look, "recorder, estimator,controller,leader")
     assert done.returncode == 1
     for words in ("estimator: waiting for frames", "controller: deaf_robot: nobody", "leader is not heard"):
         assert words in done.stderr
     assert "recorder:" not in done.stderr
+
+
+@pytest.mark.parametrize("needs", ["", ",", "recorder,"])
+def test_no_names_are_no_needs(needs: str) -> None:
+    done = ran("status", "--once", "--needs", needs)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "expected names of nodes" in done.stderr
 
 
 def test_what_is_needed_is_for_one_look(lab: tuple[str, Wire]) -> None:

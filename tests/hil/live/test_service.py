@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import signal
 import socket
@@ -18,6 +19,7 @@ from hil.wire.session import reserved_endpoint
 from tests.routers import router
 
 PATIENCE = 60.0
+READY = b"READY=1\nSTATUS=takes part"
 
 
 @pytest.fixture
@@ -51,7 +53,20 @@ def test_it_says_that_it_goes_round_once_it_is_ready_and_not_too_often(ear: sock
         for at in range(200):
             service.goes_round(1.0 + at * 0.01)
         service.ends()
-        assert [ear.recv(64) for _ in range(6)] == [b"READY=1", *[b"WATCHDOG=1"] * 4, b"STOPPING=1"]
+        assert [ear.recv(64) for _ in range(6)] == [READY, *[b"WATCHDOG=1"] * 4, b"STOPPING=1"]
+
+
+def test_a_service_waits_for_its_router_for_ever_and_ends_when_it_is_told(
+    ear: socket.socket, tmp_path: Path
+) -> None:
+    with ear, reserved_endpoint() as nobody:
+        assert Service().patience_s("tcp/192.0.2.10:7447") == math.inf
+        assert ear.recv(64) == b"STATUS=waits for tcp/192.0.2.10:7447"
+        command = [sys.executable, "-m", "hil", "follower", "turtlebot3", "--connect", nobody]
+        with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL) as process:
+            assert ear.recv(64).startswith(b"STATUS=waits for")
+            process.terminate()
+            assert process.wait(PATIENCE) == 130
 
 
 def test_nobody_hears_where_nobody_asked(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -60,6 +75,7 @@ def test_nobody_hears_where_nobody_asked(monkeypatch: pytest.MonkeyPatch) -> Non
     service.ready(0.0)
     service.goes_round(1.0)
     service.ends()
+    assert service.patience_s("tcp/192.0.2.10:7447") < 60.0
 
 
 @pytest.mark.parametrize(
@@ -77,7 +93,9 @@ def test_a_daemon_says_when_it_is_ready_lives_and_ends_and_nothing_while_it_is_f
             stderr=subprocess.DEVNULL,
         )
         try:
-            assert [ear.recv(64) for _ in range(4)] == [b"READY=1", *[b"WATCHDOG=1"] * 3]
+            if command[0] != "router":
+                assert ear.recv(64).startswith(b"STATUS=waits for tcp/")
+            assert [ear.recv(64) for _ in range(4)] == [READY, *[b"WATCHDOG=1"] * 3]
             process.send_signal(signal.SIGSTOP)
             time.sleep(0.1)
             # What it said just before.

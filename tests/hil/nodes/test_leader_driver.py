@@ -80,6 +80,17 @@ def test_it_stands_until_all_are_well(missing: int) -> None:
     assert problem(state).startswith("waiting for")
 
 
+def test_a_robot_that_does_not_listen_holds_the_start_up_until_it_does() -> None:
+    found = {"finding.deaf_robot": "nobody listens to /follower/cmd_vel, expected its robot to"}
+    deaf = Event(topics.DIAGNOSTICS, encode(diagnostics("bridge/ros2", BEGIN_NS, "", found)))
+    tells = [(0.5 * k, deaf) for k in range(8)]
+    state, sent = driven([*READY, *WELL, *tells], 4.0)
+    assert state.since_ns is None
+    assert {motion for _, motion in sent} == {Motion(0.0, 0.0)}
+    state, _ = driven([*READY, *WELL, *tells, (4.0, report("bridge/ros2"))], 6.0)
+    assert state.since_ns == pytest.approx(BEGIN_NS + 5.0e9, abs=2e7)
+
+
 def test_it_sets_off_after_the_countdown_and_drives_its_program_on_average() -> None:
     state, sent = driven([*READY, *WELL], 8.9)
     assert state.since_ns is not None

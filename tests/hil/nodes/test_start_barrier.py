@@ -56,25 +56,6 @@ def test_who_reports_a_problem_is_not_there_any_more() -> None:
     assert BARRIER.is_open(BARRIER.after(present, report("recorder")))
 
 
-def test_a_robot_that_does_not_listen_holds_the_start_up_until_it_does() -> None:
-    present = NOBODY
-    for event in ALL:
-        present = BARRIER.after(present, event)
-    deaf = {"finding.deaf_robot": "nobody listens to /follower/cmd_vel, expected its robot to"}
-    told = Event(topics.DIAGNOSTICS, encode(diagnostics("bridge/ros2", 1, "", deaf)))
-    present = BARRIER.after(present, told)
-    assert not BARRIER.is_open(present)
-    assert BARRIER.waits_for(present) == "waiting for a robot to listen, of which bridge/ros2 tells"
-    assert BARRIER.is_open(BARRIER.after(present, report("bridge/ros2")))
-
-
-def test_a_robot_that_was_told_to_move_and_stands_does_not_hold_it_up() -> None:
-    stands = Event(
-        topics.DIAGNOSTICS, encode(diagnostics("controller/x", 1, "", {"finding.deaf_robot": "stands"}))
-    )
-    assert BARRIER.after(NOBODY, stands) == NOBODY
-
-
 def test_strangers_do_not_count() -> None:
     assert BARRIER.after(NOBODY, report("emulator")) == NOBODY
 

@@ -59,7 +59,7 @@ def test_other_assumptions_other_code_and_what_is_no_certificate_are_worked_out(
         kept_certificate(LEFT)
     assert worked == [PAIR, LEFT] * 2
     for number, place in enumerate(folder.glob("certificate-*")):
-        place.write_text(("", "{}", "[1]", '{"claims": {"rates": 3}}')[number], encoding="utf-8")
+        place.write_text(("", '{"claims": []}', "[1]", '{"claims": {"rates": 3}}')[number], encoding="utf-8")
     kept_certificate(PAIR)
     kept_certificate(LEFT)
     assert worked == [PAIR, LEFT] * 3
@@ -71,6 +71,15 @@ def test_no_place_to_keep_them_is_no_error(place: Path | None, monkeypatch: pyte
     monkeypatch.setattr(formation.compile_cache, "cache_folder", lambda: place)
     monkeypatch.setattr(CERTIFY, lambda _: known)
     assert kept_certificate(LEFT) is known
+
+
+def test_what_cannot_be_kept_leaves_nothing_behind(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.replace", full)
+    assert kept_certificate(LEFT).claims() == certify(LEFT).claims()
+    assert list(folder.glob("certificate-*")) == []
 
 
 def test_no_more_than_so_many_are_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -50,6 +50,8 @@ def test_all_followers_count_together() -> None:
         ({"recorder": GROWING}, "recorder grows by 2.00 MB an hour, expected 1 at most"),
         ({"summary": {"cycles": {**CYCLES, "late": 21}}}, "21 of 200000 cycles were late"),
         ({"verified": Verification(1, 1000, 3)}, "3 of 1000 outputs differ"),
+        ({"verified": Verification(2, 0, 0, "abreast: log: damaged")}, "exit code 2: abreast: log: damaged"),
+        ({"summary": {"duration_s": 1.0}}, "no cycles to judge"),
         ({"verified": None}, "there is no log"),
     ],
 )
