@@ -77,6 +77,12 @@ def test_what_is_there_is_added_to_if_it_is_a_result(tmp_path: Path) -> None:
     assert "faults.json is no result" in done.stderr
 
 
+def test_drivers_in_ros_take_rclpy() -> None:
+    done = faults("--ros", "--only", "kill-follower-run")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "--ros: rclpy is not installed here" in done.stderr
+
+
 def test_all_names_are_listed() -> None:
     done = faults("--list")
     assert done.returncode == 0
