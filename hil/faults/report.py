@@ -42,7 +42,8 @@ shares nothing with abreast but the wire, takes what their drivers are told.
 - `memory`: the largest process [MB].
 
 """
-_IN_ROS = """Drivers hear in ROS 2, by rclpy: guards speak to them without a bridge (`--ros`).
+_IN_ROS = """Drivers hear in ROS 2, by rclpy: guards speak to them without a bridge (`--ros`). Behind the network namespace
+of a cut lie both robots then, their guards and the motion capture.
 
 """
 _HEADS = (
