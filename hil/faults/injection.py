@@ -20,12 +20,11 @@ from hil.faults.fault import (
     Stranger,
 )
 from hil.faults.judgement import Reason
-from hil.faults.lab import SCENARIO, Lab
+from hil.faults.lab import SCENARIO, START_S, Lab
 
 _BUSY = "while True: pass"
 _JOINS_S = 30.0
 _TAKES_S = 12.0
-_SETS_OFF_S = 120.0
 
 
 def inject(lab: Lab, act: Act) -> Reason:
@@ -57,7 +56,7 @@ def inject(lab: Lab, act: Act) -> Reason:
 def _look_on(lab: Lab, act: Nothing) -> Reason:
     from_s = time.monotonic()
     if act.at_s is not None:
-        lab.watch(_SETS_OFF_S, lambda: bool(_set_off_s(lab)) or not lab.is_running())
+        lab.watch(START_S, lambda: bool(_set_off_s(lab)) or not lab.is_running())
         from_s = _set_off_s(lab) + act.at_s
     lab.watch(act.for_s, lambda: not lab.is_running())
     return Reason(from_s, from_s + act.lasts_s if act.at_s is not None else time.monotonic())

@@ -28,7 +28,9 @@ DRIVES_V = 0.03
 # Of a leader of two speeds the verdict proves less, which takes seconds of CPU after each run.
 _PROGRAM = "{ kind = 'table', t = [0.0, 10.0], v = [0.08, 0.081], u = [0.3, 0.3] }"
 _OVERRIDES = ["run.evaluate_from_s=0.5", f"leader.program={_PROGRAM}"]
-_START_S = 90.0
+START_S = 900.0
+"""For robots to drive [s]: the first start of all on a machine compiles for minutes."""
+
 _LOOK_S = 0.05
 
 
@@ -73,7 +75,7 @@ class Lab:
             seen = [self.look().of(robot).rolled for robot in ROBOTS]
             return all(each and each[-1].v > DRIVES_V for each in seen) or not self.is_running()
 
-        return self.watch(_START_S, drive) and self.is_running()
+        return self.watch(START_S, drive) and self.is_running()
 
     def is_running(self) -> bool:
         """Whether the run goes on; a lab by hand always does."""
@@ -113,7 +115,7 @@ def running_lab(folder: Path, setting: Setting, ros: int | None = None) -> Itera
         chosen = with_guards(
             load_scenario(
                 SCENARIO,
-                ["run.evaluate_from_s=0.5", f"leader.program={_PROGRAM}", f"wire.domain={ros or 0}"],
+                [*_OVERRIDES, f"wire.domain={ros or 0}"],
             )
         )
         own.write_text(scenario_text(chosen), encoding="utf-8")

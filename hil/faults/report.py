@@ -42,8 +42,8 @@ shares nothing with abreast but the wire, takes what their drivers are told.
 - `memory`: the largest process [MB].
 
 """
-_IN_ROS = """Drivers hear in ROS 2, by rclpy: guards speak to them without a bridge (`--ros`). Behind the network namespace
-of a cut lie both robots then, their guards and the motion capture.
+_IN_ROS = """Drivers hear in ROS 2, by rclpy: guards speak to them without a bridge (`--ros`). Where a network
+namespace is cut off, both robots lie in it, with their guards and the motion capture.
 
 """
 _HEADS = (
