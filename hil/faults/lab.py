@@ -112,12 +112,7 @@ def running_lab(folder: Path, setting: Setting, ros: int | None = None) -> Itera
         held.callback(processes.close)
         lab = Lab(folder, setting, processes, link)
         own = folder / "scenario.toml"
-        chosen = with_guards(
-            load_scenario(
-                SCENARIO,
-                [*_OVERRIDES, f"wire.domain={ros or 0}"],
-            )
-        )
+        chosen = with_guards(load_scenario(SCENARIO, [*_OVERRIDES, f"wire.domain={ros or 0}"]))
         own.write_text(scenario_text(chosen), encoding="utf-8")
         nears = {"leader": held.enter_context(reserved_endpoint()), "follower": link.near}
         if setting.how == "emulated":
