@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from hil.faults.processes import Processes
 from hil.wire.session import reserved_endpoint
 
-_CABLE, _NEAR = "10.213.77", "10.213.78"
+_NETS = "10.213"
 _PORT = 7447
 
 
@@ -62,12 +62,13 @@ def relayed(processes: Processes) -> Iterator[Link]:
 def cabled() -> Iterator[Link]:
     """A network namespace for the follower; raises :class:`NotHereError` for who may not make one."""
     name = f"abreast-{os.getpid()}"
+    lab_net, near_net = _free_nets()
     cable, near = f"ab{os.getpid() % 100000}c", f"ab{os.getpid() % 100000}n"
     inside = ["ip", "-n", name]
     with ExitStack() as held:
         _do(["ip", "netns", "add", name])
         held.callback(_quietly, ["ip", "netns", "del", name])
-        for ours, theirs, net in ((cable, "cable", _CABLE), (near, "near", _NEAR)):
+        for ours, theirs, net in ((cable, "cable", lab_net), (near, "near", near_net)):
             _do(["ip", "link", "add", ours, "type", "veth", "peer", "name", theirs, "netns", name])
             held.callback(_quietly, ["ip", "link", "del", ours])
             _do(["ip", "addr", "add", f"{net}.1/30", "dev", ours])
@@ -80,17 +81,29 @@ def cabled() -> Iterator[Link]:
             # The robot's end goes down: that of the lab keeps its address.
             _do([*inside, "link", "set", "cable", "down" if words == "freeze" else "up"])
 
-        router = f"tcp/{_CABLE}.1:{_PORT}"
-        yield Link(router, router, f"tcp/{_NEAR}.2:{_PORT}", ("ip", "netns", "exec", name), become)
+        router = f"tcp/{lab_net}.1:{_PORT}"
+        yield Link(router, router, f"tcp/{near_net}.2:{_PORT}", ("ip", "netns", "exec", name), become)
 
 
-def _do(command: Sequence[str]) -> None:
+def _free_nets() -> tuple[str, str]:
+    """Two networks that no interface here has: of two labs on one machine each is to have its own."""
+    told = _do(["ip", "-o", "-4", "addr"])
+    # Who looks at the same moment begins elsewhere.
+    for step in range(128):
+        nets = [f"{_NETS}.{2 * ((os.getpid() + step) % 128) + each}" for each in range(2)]
+        if not any(f" {net}." in told for net in nets):
+            return nets[0], nets[1]
+    raise NotHereError(f"no network within {_NETS} is free here")
+
+
+def _do(command: Sequence[str]) -> str:
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False)
     except FileNotFoundError:
         raise NotHereError(f"there is no {command[0]} here") from None
     if done.returncode:
         raise NotHereError(f"{' '.join(command)}: {' '.join(done.stderr.split())}")
+    return done.stdout
 
 
 def _quietly(command: Sequence[str]) -> None:
