@@ -52,7 +52,8 @@ def test_a_soak_that_is_told_to_end_ends_its_run_and_leaves_its_verdict(
         until = time.monotonic() + PATIENCE
         while not (folder / "run.mcap").exists() and time.monotonic() < until:
             time.sleep(0.1)
-        time.sleep(3.0)
+        # It looks every 5 s.
+        time.sleep(8.0)
         process.send_signal(number)
         _, said = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130, said
