@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import subprocess
 import sys
@@ -67,7 +68,7 @@ class Processes:
             self.memory_mb = max(self.memory_mb, memory_mb(pid, peak=True))
 
     def close(self) -> None:
-        """Kill whatever still runs."""
+        """Kill whatever still runs, what was started by others among it: a frozen daemon outlives its run."""
         for process in self.running.values():
             if process.poll() is None:
                 process.kill()
@@ -76,6 +77,9 @@ class Processes:
                 if pipe is not None:
                     with contextlib.suppress(OSError):
                         pipe.close()
+        for pid in pids_with(str(self._folder)):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
 
     def _words(self, name: str) -> Path:
         return self._folder / f"{name}.err"

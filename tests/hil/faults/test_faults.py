@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from hil.live.process_table import pids_with
+
 HANDFUL = ("kill-follower-run", "stop-follower-run", "cut-1s-relay", "second-controller", "mocap-dropout")
 
 
@@ -46,8 +48,12 @@ def test_ctrl_c_leaves_what_was_tried_by_then(tmp_path: Path) -> None:
         # The second try has begun once its folder is there.
         while time.monotonic() < until and not second_tries(process.pid):
             time.sleep(0.2)
+        # Whoever is in a hurry presses it twice.
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.05)
         process.send_signal(signal.SIGINT)
         told, _ = process.communicate(timeout=120.0)
+    assert pids_with("abreast-faults-") == {}
     assert process.returncode == 130
     (case,) = json.loads(told)["cases"]
     assert case["fault"] == "term-recorder-by-hand"
