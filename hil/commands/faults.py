@@ -66,7 +66,7 @@ def command(
     if ros:
         refuse_without_ros()
     before = _before(out, ros) if add and out is not None else Session(ros=ros)
-    interrupt_on_signals()
+    interrupt_on_signals(once=True)
     how = Tries(tries, _domain() if ros else None, None if out is None else out / "wrong")
     session = tried(chosen, how, lambda line: click.echo(line, err=True))
     session.cases = merged(before.cases, session.cases, faults())

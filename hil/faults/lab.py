@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
 
 from hil.faults.fault import Setting
 from hil.faults.link import Link, NotHereError, cabled, no_link, relayed
@@ -34,7 +32,6 @@ START_S = 900.0
 """For robots to drive [s]: the first start of all on a machine compiles for minutes."""
 
 _LOOK_S = 0.05
-_ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Lab:
@@ -107,7 +104,6 @@ def running_lab(folder: Path, setting: Setting, ros: int | None = None) -> Itera
         raise NotHereError("emulated robots have no driver in ROS")
     folder.mkdir(parents=True)
     with ExitStack() as held:
-        held.callback(_heed, {number: signal.getsignal(number) for number in _ENDS})
         if setting.disk_mb:
             held.enter_context(_small_disk(folder / "run", setting.disk_mb))
         processes = Processes(folder)
@@ -134,14 +130,7 @@ def running_lab(folder: Path, setting: Setting, ros: int | None = None) -> Itera
         processes.start("observer", "-m", *words, before=link.before if in_ros else ())
         if setting.how != "emulated":
             _start_guards(lab, own, nears, in_ros=bool(in_ros))
-        # A second Ctrl-C would leave behind what the first one takes away.
-        held.callback(_heed, dict.fromkeys(_ENDS, signal.SIG_IGN))
         yield lab
-
-
-def _heed(handlers: Mapping[signal.Signals, Any]) -> None:
-    for number, handler in handlers.items():
-        signal.signal(number, handler)
 
 
 def _start_guards(lab: Lab, scenario: Path, nears: dict[str, str], *, in_ros: bool) -> None:
