@@ -22,9 +22,15 @@ GUIDE = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r'^COMMAND="(.*)"$', GUIDE, re.MULTILINE)
 
 
-def read_unit() -> configparser.ConfigParser:
-    unit = configparser.ConfigParser(interpolation=None, strict=False)
-    unit.optionxform = str  # type: ignore[assignment,method-assign]
+class Unit(configparser.ConfigParser):
+    """A unit of systemd, whose names are in upper and lower case."""
+
+    def optionxform(self, optionstr: str) -> str:
+        return optionstr
+
+
+def read_unit() -> Unit:
+    unit = Unit(interpolation=None, strict=False)
     unit.read_string(UNIT.read_text(encoding="utf-8"))
     return unit
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -14,10 +15,8 @@ from hil.guard.ros_driver import NO_RCLPY
 
 def refuse_without_ros() -> None:
     """Raise :class:`UsageError` where rclpy is not installed."""
-    try:
-        import rclpy  # noqa: F401
-    except ImportError:
-        raise UsageError(NO_RCLPY) from None
+    if importlib.util.find_spec("rclpy") is None:
+        raise UsageError(NO_RCLPY)
 
 
 class RosEar:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import tempfile
 from collections.abc import Iterator
@@ -58,8 +59,6 @@ class IndexSpool:
 
     def _lose(self) -> None:
         self.lost = True
-        try:
+        # It may have something left that the disk does not take.
+        with contextlib.suppress(OSError):
             self._file.close()
-        except OSError:
-            # It had something left to write.
-            return

@@ -119,7 +119,10 @@ class LogWriter:
                 self._mcap.close_chunk()
                 # Where the summary does not fit, the data go on to their end all the same.
                 self._whole_bytes = self.bytes
-                self._mcap.finish()
+                try:
+                    self._mcap.finish()
+                except OSError as error:
+                    raise self._given_up(error) from error
         finally:
             self._mcap.close()
             self._file.close()
@@ -170,14 +173,16 @@ class LogWriter:
         try:
             self._put(data)
         except OSError as error:
-            self._failed = True
-            reason, disk = error.strerror or str(error), disk_of(self.path)
-            whole = self._end_early()
-            kept = "it is whole up to there" if whole else "abreast recover keeps what is whole"
-            raise AbreastError(
-                f"log {self.path}: writing failed ({reason}) on {disk}; {kept}, make room there"
-            ) from error
+            raise self._given_up(error) from error
         self.bytes += len(data)
+
+    def _given_up(self, error: OSError) -> AbreastError:
+        """End the file before its time, as the disk does not take or give what it should."""
+        self._failed = True
+        reason, disk = error.strerror or str(error), disk_of(self.path)
+        whole = self._end_early()
+        kept = "it is whole up to there" if whole else "abreast recover keeps what is whole"
+        return AbreastError(f"log {self.path}: writing failed ({reason}) on {disk}; {kept}, make room there")
 
     def _put(self, data: bytes) -> None:
         rest = memoryview(data)

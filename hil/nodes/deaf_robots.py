@@ -26,8 +26,6 @@ class Told(NamedTuple):
 DeafRobots = Mapping[str, Told]
 """Reporters by their names."""
 
-NOBODY: DeafRobots = {}
-
 
 def with_report(deaf: DeafRobots, report: msg.DiagnosticArray, now_ns: int) -> DeafRobots:
     """The same after a report. A controller's finding is on how its robot moves, and counts for nothing."""

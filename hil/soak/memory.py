@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -32,8 +33,5 @@ def growth_mb_h(samples: Sequence[Sample], settles_s: float = SETTLES_S) -> floa
     settled = [each for each in samples if each.at_s >= settles_s]
     if not settled or settled[-1].at_s - settled[0].at_s < WATCHED_S * (1.0 - 1e-2):
         return None
-    middle = sum(each.at_s for each in settled) / len(settled)
-    level = sum(each.mb for each in settled) / len(settled)
-    along = sum((each.at_s - middle) * (each.mb - level) for each in settled)
-    spread = sum((each.at_s - middle) ** 2 for each in settled)
-    return round(_HOUR_S * along / spread, 6)
+    line = statistics.linear_regression([each.at_s for each in settled], [each.mb for each in settled])
+    return round(_HOUR_S * line.slope, 6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import threading
@@ -52,11 +53,10 @@ def refused_links_said(say: Say) -> Iterator[None]:
     Standard output is Zenoh's until then; what else it logs goes on to where that went. With ``RUST_LOG`` the
     log is as that says, and nothing is said here.
     """
+    zenoh.init_log_from_env_or("zenoh_link_tls=warn")
     if "RUST_LOG" in os.environ:
-        zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]
         yield
         return
-    zenoh.init_log_from_env_or("zenoh_link_tls=warn")
     before = os.dup(1)
     reads, writes = os.pipe()
     os.dup2(writes, 1)
@@ -76,9 +76,12 @@ def _read(reads: int, before: int, say: Say) -> None:
     refused = RefusedLinks()
     with os.fdopen(reads, encoding="utf-8", errors="replace") as lines:
         for line in lines:
-            if not refused.hear(line):
-                os.write(before, line.encode())
-            elif text := refused.told(time.monotonic()):
-                say(text)
+            # Whoever reads us may be gone: the pipe is emptied all the same, else Zenoh would stand still.
+            with contextlib.suppress(OSError):
+                if not refused.hear(line):
+                    os.write(before, line.encode())
+                elif text := refused.told(time.monotonic()):
+                    say(text)
     if text := refused.told(float("inf")):
-        say(text)
+        with contextlib.suppress(OSError):
+            say(text)

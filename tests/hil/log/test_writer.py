@@ -8,18 +8,19 @@ import sys
 import textwrap
 import tracemalloc
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from mcap.reader import McapReader, make_reader
-from mcap.records import Statistics, SummaryOffset
+from mcap.records import Footer, Statistics, SummaryOffset
 from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from hil.errors import AbreastError, UsageError
 from hil.log import metadata_sums
+from hil.log.index_spool import IndexSpool
 from hil.log.reader import read_log
 from hil.log.recovery import recover
 from hil.log.writer import LogWriter
@@ -221,6 +222,51 @@ def test_a_full_disk_is_one_clear_error_and_keeps_what_was_written(tmp_path: Pat
         assert len(list(make_reader(stream, validate_crcs=True).iter_messages())) == found.messages
     with AnyReader([path]) as bag:
         assert bag.message_count == found.messages
+
+
+def summary_at(path: Path) -> int:
+    """Where the summary of a whole log begins."""
+    with path.open("rb") as stream:
+        (footer,) = (each for each in StreamReader(stream).records if isinstance(each, Footer))
+    return int(footer.summary_start)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.6, 0.9, 0.999])
+def test_a_disk_that_takes_no_summary_keeps_all_of_the_data(tmp_path: Path, share: float) -> None:
+    whole, path = tmp_path / "whole.mcap", tmp_path / "run.mcap"
+    with LogWriter(whole, METADATA) as log:
+        fill(log, 3_000)
+    begin, end = summary_at(whole), whole.stat().st_size
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    log = LogWriter(path, METADATA)
+    try:
+        fill(log, 3_000)
+        # An end without a summary takes 50 bytes.
+        resource.setrlimit(resource.RLIMIT_FSIZE, (begin + 50 + round(share * (end - begin - 51)), hard))
+        with pytest.raises(AbreastError, match="it is whole up to there"):
+            log.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, before)
+    assert read_log(path).messages == 3_000
+    with path.open("rb") as stream:
+        assert len(list(make_reader(stream, validate_crcs=True).iter_messages())) == 3_000
+
+
+def test_an_index_that_cannot_be_read_back_keeps_all_of_the_data(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(_: IndexSpool) -> Iterator[bytes]:
+        yield b"half of it"
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(IndexSpool, "blocks", broken)
+    log = LogWriter(tmp_path / "run.mcap", METADATA)
+    fill(log, 3_000)
+    with pytest.raises(AbreastError, match=r"Input/output error.*it is whole up to there"):
+        log.close()
+    assert read_log(tmp_path / "run.mcap").messages == 3_000
 
 
 def test_an_unknown_type_is_refused_when_it_is_written(tmp_path: Path) -> None:

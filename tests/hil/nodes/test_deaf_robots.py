@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from hil.nodes.deaf_robots import NOBODY, PATIENCE_S, DeafRobots, waits_for, with_report
+from hil.nodes.deaf_robots import PATIENCE_S, DeafRobots, waits_for, with_report
 from hil.nodes.node import diagnostics
 
+NOBODY: DeafRobots = {}
 S = 1_000_000_000
 DEAF = {"finding.deaf_robot": "nobody listens to /follower/cmd_vel, expected its robot to"}
 WORDS = "waiting for a robot to listen, of which bridge/ros2 tells"
