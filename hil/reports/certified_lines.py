@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from hil.figures.plot_data import PlotData
+from hil.reports.colours import PURPLE
 from hil.reports.plot_models import Figure
-from hil.reports.plots import PURPLE, Key, draw_line, table
+from hil.reports.plots import Key, draw_line, table
 
 _CERTIFIED = ("v1", "alpha1")
 

@@ -13,13 +13,10 @@ from hil.figures.plot_data import PlotData, broken_at_jumps, outside
 from hil.judge.columns import EstimateColumns, inside
 from hil.judge.estimation import errors_at
 from hil.reports.certified_lines import draw_certified, largest_radius
+from hil.reports.colours import BELIEVED, BOUND, GREY, TRUE
 from hil.reports.decimation import decimated_rows
 from hil.reports.plot_models import Figure
 from hil.reports.plots import (
-    BELIEVED,
-    BOUND,
-    GREY,
-    TRUE,
     Key,
     Panel,
     TimeAxis,

@@ -10,32 +10,18 @@ from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
 from hil.figures.plot_data import LONGEST_LINE, PlotData
 from hil.judge.columns import inside
+from hil.reports.colours import BELIEVED, BLACK, BOUND, FOLLOWER, GREY, PURPLE
 from hil.reports.decimation import decimated_rows
 from hil.reports.intervals import intervals_of
 from hil.reports.plot_models import Field, Model, Value, source_of
-from hil.reports.plots import (
-    BELIEVED,
-    BOUND,
-    FOLLOWER,
-    GREY,
-    PURPLE,
-    Key,
-    Panel,
-    TimeAxis,
-    draw_level,
-    draw_line,
-    draw_marks,
-    hover,
-    marks,
-    table,
-)
+from hil.reports.plots import Key, Panel, TimeAxis, draw_level, draw_line, draw_marks, hover, marks, table
 
 _STATUS_COLOURS = {
     Status.INITIALISING: GREY,
     Status.TRACKING: BELIEVED,
     Status.COASTING: PURPLE,
     Status.REJECTING: BOUND,
-    Status.LOST: "#222222",
+    Status.LOST: BLACK,
 }
 _EXPECTED_NIS = 2.0
 _ROW_HEIGHT, _AXIS_HEIGHT = 30, 90

@@ -14,13 +14,16 @@ from hil.reports.bound_plot import tightness_panel
 from hil.reports.command_plots import command_panels, stops_of
 from hil.reports.estimate_plots import estimate_panels
 from hil.reports.filter_plots import latency_panel, nis_panel, status_panel
-from hil.reports.page import Section, page
+from hil.reports.page import Section, Timeline, page
 from hil.reports.plots import TimeAxis
 from hil.reports.run_tables import stops_table, summary_tables
-from hil.reports.shape_plots import shape_panels
+from hil.reports.shape_plots import COURSE, shape_panels
 from hil.reports.track_plot import track_panel
 
 _MARKS = {GOOD: ("good", "✓ "), BAD: ("bad", "✗ ")}
+
+
+_READOUT = (("rho", "ρ", "m", 3), ("alpha1", "α₁", "rad", 2), ("alpha2", "α₂", "rad", 2))
 
 
 def run_report(data: PlotData, summary: Mapping[str, Any]) -> str:
@@ -32,14 +35,16 @@ def run_report(data: PlotData, summary: Mapping[str, Any]) -> str:
     moments = data.seconds(np.array([run.from_ns, run.to_ns, span.from_ns]))
     axis = TimeAxis(*moments.tolist())
     tracks = track_panel(data)
+    shapes = shape_panels(data, axis)
     sections = [
-        Section("Figures", summary_tables(summary)),
-        Section("The formation", panels=[*([tracks] if tracks else []), *shape_panels(data, axis)]),
+        Section("At a glance", panels=[*([tracks] if tracks else []), *shapes[:2]], quiet=True),
+        Section("Formation", panels=shapes[2:]),
         Section(
             "What the follower believed of the leader",
             panels=[*estimate_panels(data, axis), *filter(None, [tightness_panel(data, axis)])],
         ),
         Section("What the follower was told to do", stops_table(stops_of(data)), command_panels(data, axis)),
+        Section("Figures", summary_tables(summary)),
         Section(
             "How the estimates came about",
             panels=list(
@@ -47,13 +52,16 @@ def run_report(data: PlotData, summary: Mapping[str, Any]) -> str:
             ),
         ),
     ]
+    readout = [(symbol, unit, digits, COURSE + name) for name, symbol, unit, digits in _READOUT if shapes]
     shaded = ""
     if axis.judged_from > axis.first:
         shaded = (
             f'<p class="soft">What is shaded in the plots, before {axis.judged_from:.3g} s, is not judged. '
             "All plots over time zoom together.</p>"
         )
-    return page(f"{' · '.join(_names(summary))} – abreast", _head(summary) + shaded, sections)
+    timeline = Timeline(axis.first, axis.last, readout)
+    title = f"{' · '.join(_names(summary))} – abreast"
+    return page(title, _head(summary) + shaded, sections, timeline=timeline)
 
 
 def _names(summary: Mapping[str, Any]) -> list[str]:

@@ -10,21 +10,11 @@ from numpy.typing import NDArray
 from formation.angles import FloatArray
 from hil.figures.plot_data import PlotData, broken_at_jumps
 from hil.judge.columns import inside
-from hil.reports.plots import (
-    BELIEVED,
-    GREY,
-    ORBIT,
-    TRUE,
-    Key,
-    Panel,
-    TimeAxis,
-    draw_line,
-    hover,
-    limits_around,
-    marks,
-    table,
-)
+from hil.reports.colours import BELIEVED, GREY, ORBIT, TRUE
+from hil.reports.plots import Key, Panel, TimeAxis, draw_line, hover, limits_around, marks, table
 
+COURSE = "course "
+"""What the names of the data of shape variables begin with."""
 _SHAPES = (
     ("rho", "ρ", "m", "Distance ρ", "The distance between the robots."),
     ("alpha1", "α₁", "rad", "Bearing α₁", "Where the leader sees the follower, from its own heading."),
@@ -78,6 +68,7 @@ def _panels(
         floor = 0.0 if name == "rho" else -math.pi
         plot = axis.panel(f"{symbol} [{unit}]", limits_around(*held.values(), *level, floor=floor))
         source = table(t, held["y"], held)
+        source.set(name=COURSE + name)
         keys, tips = [Key(label, colour)], {"t": "@t{0.00} s", label: f"@y{{0.0000}} {unit}"}
         if driven:
             draw_line(plot, marks(since, desired[k]), "y", GREY, dash="dotted")
