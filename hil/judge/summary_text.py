@@ -253,7 +253,8 @@ def _formation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
         yield f"the formation is not kept: the distance is {off:.2g} m RMS off the noise-free run"
     sent = commands.get("sent", 0)
     if commands.get("stopped", 0) > STOPPED_SHARE * sent:
-        yield f"in {commands['stopped'] / sent:.0%} of the commands the robot was told to stand still"
+        share = f"{commands['stopped'] / sent:.0%}"
+        yield f"in {share} of the commands the robot was told to stand still after its first drive"
     if commands.get("saturated", 0) > SATURATED_SHARE * sent:
         yield f"{commands['saturated'] / sent:.0%} of the commands were at a limit of the robot"
     if "orders_refused" in summary:

@@ -16,10 +16,17 @@ from hil.reports.plots import Key, Panel, TimeAxis, draw_level, draw_line, hover
 
 
 def stops_of(data: PlotData) -> list[TimeInterval]:
-    """Intervals over which the robot was told to stand still, by reason, while the run lasted."""
-    issued_ns = data.columns.commands.issued_ns
+    """Intervals over which the robot was told to stand still, by reason, while the run lasted.
+
+    That it waits before its first drive is none.
+    """
+    commands = data.columns.commands
+    issued_ns, stood = commands.issued_ns, commands.stood
     during = inside(issued_ns, data.columns.run) & (issued_ns < data.columns.run.to_ns)
-    reasons = [stop for stop, counts in zip(data.columns.commands.stop, during, strict=True) if counts]
+    told = [
+        (stop, stands) for stop, stands, counts in zip(commands.stop, stood, during, strict=True) if counts
+    ]
+    reasons = [stop if stands else "" for stop, stands in told]
     intervals = intervals_of(data.seconds(issued_ns[during]), reasons, LONGEST_LINE)
     return [interval for interval in intervals if interval.what]
 
