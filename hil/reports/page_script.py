@@ -12,6 +12,8 @@ NOW, ROBOT, JOINED, TRACK = "now", "robot ", "joined", "track "
 The data of a robot carry its outline, ahead to the right, in their tags.
 """
 
+_HIGHEST_ON_A_PHONE = 350
+
 THEME = """
 const dark = () => {
   const chosen = document.documentElement.dataset.theme;
@@ -48,6 +50,11 @@ const recoloured = (colour, by) => typeof colour === "string" ? by.get(colour)
   ? {...colour, value: by.get(colour.value)} : undefined;
 const plots = JSON.parse(document.getElementById("plots").textContent, (key, value) =>
   drawnDark && key.endsWith("_color") ? recoloured(value, inDark) ?? value : value);
+if (innerWidth < 600) for (const [number, plot] of Object.entries(plots.plots.roots))
+  if (plot.attributes.height > %(narrow)d) {
+    plot.attributes.height = %(narrow)d;
+    document.getElementById("plot" + number).style.minHeight = "%(narrow)dpx";
+  }
 const inked = () => {
   if (dark() === drawnDark) return;
   drawnDark = !drawnDark;
@@ -155,4 +162,4 @@ drawn.then(() => {
 
 def drawing(items: str) -> str:
     """Script that draws the plots; ``items``: which goes where, in Bokeh's JSON."""
-    return _DRAW % {"colours": json.dumps(DARKENED), "items": items}
+    return _DRAW % {"colours": json.dumps(DARKENED), "items": items, "narrow": _HIGHEST_ON_A_PHONE}

@@ -37,9 +37,10 @@ button[aria-pressed=true] { background: var(--link); border-color: var(--link); 
 .verdict.warn { border-color: var(--warn); } .verdict.bad { border-color: var(--bad); }
 .verdict strong { font-size: 1.1rem; } .verdict ul { margin: .3rem 0; padding-left: 1.2rem; }
 .good { color: var(--good); } .warn { color: var(--warn); } .bad { color: var(--bad); }
-.bad, .warn { font-weight: 600; } .verdict.bad, .verdict.warn { font-weight: inherit; color: inherit; }
+.bad, .warn { font-weight: 600; } .verdict { font-weight: inherit; color: inherit; }
 .reasons { list-style: none; margin: .5rem 0; padding: 0; display: grid; gap: .1rem 1rem;
   grid-template-columns: repeat(auto-fit, minmax(min(100%, 24rem), 1fr)); font-size: .92rem; }
+.warnings { list-style: none; padding: 0; margin: .4rem 0; }
 .reasons li { display: grid; grid-template-columns: 1.2rem 5.2rem 1fr; padding: .1rem 0; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: .1rem .8rem; margin: .6rem 0; }
 dt { font-weight: 600; } dd { margin: 0; min-width: 0; overflow-wrap: anywhere; }
