@@ -139,6 +139,16 @@ class CommandColumns:
             v2_wanted=rows["v2_wanted"],
         )
 
+    @property
+    def stood(self) -> NDArray[np.bool_]:
+        """Commands by which the robot was told to stand still, from its first drive on.
+
+        Before that it waits: for the first estimate, in a chain for its predecessor. A robot that was never
+        driven was told to stand by all of them.
+        """
+        drives = np.flatnonzero(~self.stopped)
+        return self.stopped & (np.arange(len(self.stopped)) >= (drives[0] if len(drives) else 0))
+
 
 class _Words(Sequence[str]):
     """Texts by their numbers."""

@@ -24,6 +24,7 @@ from hil.log.metadata import (
     scenario_of,
     truth_is_of_bodies,
 )
+from hil.log.origin import Origin, origin_of
 from hil.log.reader import Log, Record
 from hil.nodes.findings import Findings, all_found, findings_in
 from hil.nodes.noise_report import scale_in
@@ -75,6 +76,7 @@ class RunData:
     law of one's own. ``noise_scale``: noise of positions as it was found over what was told, None if it was
     not looked for. ``found``: findings by the nodes' names, None where no node could have told any.
     ``truth_of_bodies``: whether the truth in the log is of rigid bodies and not of the robots below.
+    ``origin``: what the log tells of how it was made.
     ``tracks``: in the place of a truth that nobody knows, what the motion capture showed of a run with robots
     that exist.
 
@@ -106,6 +108,7 @@ class RunData:
     found: Mapping[str, Findings] | None = None
     truth_of_bodies: bool = False
     tracks: MocapTracks | None = None
+    origin: Origin = field(default_factory=Origin)
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,6 +213,7 @@ def run_data_of_link(log: Log, link: Link) -> RunData:
         orders=() if link.in_chain else orders_of(scenario, _timed(log, records[names.side], String)),
         certified=_decoded(log, records[names.certified], CertifiedEstimate),
         log=_facts(log),
+        origin=origin_of(log),
         certificate=None if link.first else certificate_json(certificate_of(scenario, driven=False)),
         law=law_facts(log, counts.get(link.node_name("controller"), {})),
         noise_scale=scale_in(estimator),
@@ -240,6 +244,7 @@ def run_data_of_kept(log: Log, replay: KeptReplay) -> RunData:
         ),
         orders=() if link.in_chain else orders_of(link.scenario, [each for each in sides if each]),
         log=_facts(log),
+        origin=origin_of(log),
         certificate=None if link.first else certificate_json(certificate_of(link.scenario, driven=False)),
         law=law_facts(log, kept.reports.get(link.node_name("controller"), {})),
         kept=kept,

@@ -40,7 +40,8 @@ def summarise(run_data: RunData) -> dict[str, Any]:
     Estimates are judged where they say TRACKING, from ``estimation.evaluated_from_s`` to the stop or the end
     of the scenario's duration. ``estimation.untracked``: estimates in that time that said anything else.
     ``frames.rejected``: inputs that were refused, the robots' odometry included; frames that also held
-    strangers do not count. ``commands``: those from when the leader set off to the stop. ``seed`` and ``law``
+    strangers do not count. ``commands``: those from when the leader set off to the stop; ``stopped`` of them
+    told the robot to stand still, which counts from its first drive on. ``seed`` and ``law``
     are absent for recordings that were not driven by them. ``truth``: mocap where the smoothed tracks of the
     motion capture stand in for it, absent where it is known or nothing stands in. ``certified``: only where
     estimates are certified.
@@ -137,7 +138,7 @@ def _commands(columns: Columns) -> dict[str, int]:
     return {
         "sent": int(np.count_nonzero(during)),
         "saturated": int(np.count_nonzero(commands.saturated & during)),
-        "stopped": int(np.count_nonzero(commands.stopped & during)),
+        "stopped": int(np.count_nonzero(commands.stood & during)),
     }
 
 

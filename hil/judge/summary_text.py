@@ -44,16 +44,25 @@ def print_summary(summary: Mapping[str, Any], console: Console | None = None) ->
 
 def warnings_of(summary: Mapping[str, Any]) -> list[str]:
     """What deserves a second look, in plain words."""
-    return [
-        *_estimation_warnings(summary),
-        *noise_warnings(summary),
-        *_assumption_warnings(summary),
-        *_certified_warnings(summary),
-        *_formation_warnings(summary),
-        *_wire_warnings(summary),
-        *filter(None, [law_failure(summary)]),
-        *map(finding_line, summary.get("findings", [])),
-    ]
+    return [warning for warnings in warnings_by_part(summary).values() for warning in warnings]
+
+
+def warnings_by_part(summary: Mapping[str, Any]) -> dict[str, list[str]]:
+    """What deserves a second look, by the part of a run that it is about."""
+    law = filter(None, [law_failure(summary)])
+    return {
+        "tracking": [*_estimation_warnings(summary)],
+        "bounds": [
+            *_bound_warnings(summary),
+            *noise_warnings(summary),
+            *_assumption_warnings(summary),
+            *_certified_warnings(summary),
+        ],
+        "formation": [*_formation_warnings(summary)],
+        "saturation": [*_command_warnings(summary), *law],
+        "latency": [*_wire_warnings(summary)],
+        "findings": [*map(finding_line, summary.get("findings", []))],
+    }
 
 
 def verdict_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
@@ -225,6 +234,9 @@ def _estimation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     if nis is not None and not NIS_RANGE[0] <= nis <= NIS_RANGE[1]:
         noisier = "noisier" if nis > NIS_RANGE[1] else "quieter"
         yield f"the measurements are {noisier} than the scenario says (mean NIS {nis:.2g}, expected 2)"
+
+
+def _bound_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     for name, count in extended_violations(summary).items():
         yield f"bound {name} does not hold in {count} samples: check the noise and leader limits it rests on"
     for name, count in summary["bounds"].get("published", {}).get("violations", {}).items():
@@ -247,17 +259,22 @@ def _assumption_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _formation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
-    formation, commands = summary.get("formation", {}), summary.get("commands", {})
+    formation = summary.get("formation", {})
     off = formation.get("orbit_deviation_rms", {}).get("rho", 0.0)
     if off > OFF_SHARE * formation.get("rho_min", math.inf):
         yield f"the formation is not kept: the distance is {off:.2g} m RMS off the noise-free run"
-    sent = commands.get("sent", 0)
-    if commands.get("stopped", 0) > STOPPED_SHARE * sent:
-        yield f"in {commands['stopped'] / sent:.0%} of the commands the robot was told to stand still"
-    if commands.get("saturated", 0) > SATURATED_SHARE * sent:
-        yield f"{commands['saturated'] / sent:.0%} of the commands were at a limit of the robot"
     if "orders_refused" in summary:
         yield summary["orders_refused"]
+
+
+def _command_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
+    commands = summary.get("commands", {})
+    sent = commands.get("sent", 0)
+    if commands.get("stopped", 0) > STOPPED_SHARE * sent:
+        share = f"{commands['stopped'] / sent:.0%}"
+        yield f"in {share} of the commands the robot was told to stand still after its first drive"
+    if commands.get("saturated", 0) > SATURATED_SHARE * sent:
+        yield f"{commands['saturated'] / sent:.0%} of the commands were at a limit of the robot"
 
 
 def _wire_warnings(summary: Mapping[str, Any]) -> Iterator[str]:

@@ -10,6 +10,7 @@ from hil.live.certificate_process import CertificateProcess
 from hil.live.disk_sync import DiskSync
 from hil.live.disk_watch import FINDING, DiskWatch, refuse_full_disk
 from hil.log.metadata import LIVE, log_metadata
+from hil.log.origin import made_here
 from hil.log.rotating_log import RotatingLog
 from hil.nodes.findings import named_findings
 from hil.nodes.node import Outgoing, counted, diagnostics, is_due, named_counts, no_counts, outgoing
@@ -39,7 +40,7 @@ class Recorder:
         self.subscribes = tuple(topic for topic in self._types if topic not in topics.ONLY_IN_LOGS)
         if path.parent.is_dir():
             refuse_full_disk(path.parent)
-        self._log = RotatingLog(path, log_metadata(scenario, LIVE), scenario.recorder)
+        self._log = RotatingLog(path, log_metadata(scenario, LIVE) | made_here(), scenario.recorder)
         self._sync = DiskSync()
         self._watch = self._watched()
         self._malformed = self._oversized = no_counts()

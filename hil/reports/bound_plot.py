@@ -7,20 +7,8 @@ import math
 import numpy as np
 
 from hil.figures.plot_data import PlotData
-from hil.reports.plots import (
-    BELIEVED,
-    BOUND,
-    PURPLE,
-    TRUE,
-    Key,
-    Panel,
-    TimeAxis,
-    draw_level,
-    draw_line,
-    hover,
-    limits_around,
-    table,
-)
+from hil.reports.colours import BELIEVED, BOUND, PURPLE, TRUE
+from hil.reports.plots import Key, Panel, TimeAxis, draw_level, draw_line, hover, limits_around, table
 
 _LABELS = {"v1": "v₁", "alpha1": "α₁", "h": "h"}
 _COLOURS = {"v1": BELIEVED, "alpha1": PURPLE, "h": TRUE}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,13 +14,11 @@ from hil.figures.plot_data import PlotData, broken_at_jumps, outside
 from hil.judge.columns import EstimateColumns, inside
 from hil.judge.estimation import errors_at
 from hil.reports.certified_lines import draw_certified, largest_radius
+from hil.reports.colours import BELIEVED, BOUND, GREY, TRUE
 from hil.reports.decimation import decimated_rows
+from hil.reports.notation import SYMBOLS
 from hil.reports.plot_models import Figure
 from hil.reports.plots import (
-    BELIEVED,
-    BOUND,
-    GREY,
-    TRUE,
     Key,
     Panel,
     TimeAxis,
@@ -44,13 +43,29 @@ class _Quantity:
     unit: str
     says: str
 
+    @property
+    def scale(self) -> float:
+        """What a value in SI units is multiplied by for this unit."""
+        return _DEGREES if self.unit.startswith("deg") else 1.0
 
+    @property
+    def error_unit(self) -> str:
+        """Errors of speeds are small."""
+        return "mm/s" if self.unit == "m/s" else self.unit
+
+    @property
+    def error_scale(self) -> float:
+        """What an error in SI units is multiplied by for its unit."""
+        return 1e3 if self.unit == "m/s" else self.scale
+
+
+_DEGREES = math.degrees(1.0)
 _SHOWN = (
     _Quantity("v1", "v₁", "m/s", "Leader's speed v₁"),
-    _Quantity("alpha1", "α₁", "rad", "Leader's bearing α₁"),
+    _Quantity("alpha1", "α₁", "deg", "Leader's bearing α₁"),
     _Quantity("rho_dot", "ρ̇", "m/s", "Rate of the distance ρ̇"),
-    _Quantity("alpha2_dot", "α̇₂", "rad/s", "Rate of the bearing α̇₂"),
-    _Quantity("u1", "u₁", "rad/s", "Leader's turn rate u₁"),
+    _Quantity("alpha2_dot", "α̇₂", "deg/s", "Rate of the bearing α̇₂"),
+    _Quantity("u1", "u₁", "deg/s", "Leader's turn rate u₁"),
 )
 _RATES = {"rho_dot": "M_rho", "alpha2_dot": "M_alpha2"}
 
@@ -74,13 +89,13 @@ def _course(
     data: PlotData, axis: TimeAxis, quantity: _Quantity, during: NDArray[np.bool_], *, judged: bool
 ) -> Panel:
     """An estimate with three standard deviations and truth; with its bound if no error panel shows that."""
-    t = data.seconds(data.tracked.capture_ns)[during]
-    value = broken_at_jumps(_values(data.tracked, quantity.name)[during])
-    reach = 3.0 * data.tracked.sd[during, QUANTITIES.index(quantity.name)]
+    t, scale = data.seconds(data.tracked.capture_ns)[during], quantity.scale
+    value = scale * broken_at_jumps(_values(data.tracked, quantity.name)[during])
+    reach = 3.0 * scale * data.tracked.sd[during, QUANTITIES.index(quantity.name)]
     source = table(t, value, {"y": value, "low": value - reach, "high": value + reach, "reach": reach})
     truth = data.columns.truth
     known = inside(truth.capture_ns, data.columns.run) & np.isfinite(getattr(truth, quantity.name))
-    true = broken_at_jumps(np.asarray(getattr(truth, quantity.name))[known])
+    true = scale * broken_at_jumps(np.asarray(getattr(truth, quantity.name))[known])
     plot = axis.panel(f"{quantity.symbol} [{quantity.unit}]", _limits(data, quantity, value, true))
     keys = [Key("estimate", BELIEVED), Key("3 σ", BELIEVED, "band")]
     tips = {"t": "@t{0.00} s", "estimate": f"@y{{0.0000}} {quantity.unit}", "3 σ": "±@reach{0.0000}"}
@@ -92,16 +107,16 @@ def _course(
         draw_line(plot, truth_table, "y", TRUE)
         keys.append(Key(data.truth_name, TRUE))
         says += ", and as it was"
-    bound = _bound(data, quantity.name) if judged else None
+    bound = _bound(data, quantity.name, scale) if judged else None
     if bound is not None:
-        at, centre = _judged(data), _values(data.columns.samples, quantity.name)
+        at, centre = _judged(data), scale * _values(data.columns.samples, quantity.name)
         sides = table(at, bound, {"low": centre - bound, "high": centre + bound})
         for side in ("low", "high"):
             draw_line(plot, sides, side, BOUND, width=1.0)
         keys.append(Key("assumed bound", BOUND))
         says += f"; its error is bounded by {_range(bound, quantity.unit)} if the scenario's noise holds"
-    if judged and largest_radius(data, quantity.name) is not None:
-        keys.append(draw_certified(plot, data, quantity.name, of_error=False))
+    if judged and largest_radius(data, quantity.name, scale) is not None:
+        keys.append(draw_certified(plot, data, quantity.name, scale, of_error=False))
     return Panel(quantity.says, says + ".", tuple(keys), plot)
 
 
@@ -109,39 +124,42 @@ def _error(
     data: PlotData, axis: TimeAxis, quantity: _Quantity, during: NDArray[np.bool_], error: FloatArray
 ) -> Panel:
     """Estimate minus truth between three standard deviations and the bound; samples outside are marked."""
-    t, error = data.seconds(data.tracked.capture_ns)[during], error[during]
-    reach = 3.0 * data.tracked.sd[during, QUANTITIES.index(quantity.name)]
+    scale, unit = quantity.error_scale, quantity.error_unit
+    t, error = data.seconds(data.tracked.capture_ns)[during], scale * error[during]
+    reach = 3.0 * scale * data.tracked.sd[during, QUANTITIES.index(quantity.name)]
     largest = float(np.max(np.abs(error), where=np.isfinite(error), initial=0.0))
     height = min(
         max(1.1 * largest, 1.4 * float(np.median(reach))), 4.0 * float(np.median(reach)) + 1.1 * largest
     )
     keys = [Key("error", BELIEVED), Key("3 σ", BELIEVED, "band")]
     says = f"Error of {quantity.symbol}: estimate minus truth."
-    bound = _bound(data, quantity.name)
+    bound = _bound(data, quantity.name, scale)
     drawn = bound is not None and float(np.min(bound)) < _FARTHEST * height
     if bound is not None and drawn:
         height = max(height, min(1.1 * float(np.max(bound)), _FARTHEST * height))
-    radius = largest_radius(data, quantity.name)
+    radius = largest_radius(data, quantity.name, scale)
     certified = radius is not None and radius < _FARTHEST * height
     if radius is not None:
         height = max(height, 1.1 * radius) if certified else height
         where = "" if certified else ", outside the picture"
-        says += f" Certified radius: up to {radius:.3g} {quantity.unit}{where}."
-    plot = axis.panel(f"error [{quantity.unit}]", (-height, height))
+        says += f" Certified radius: up to {radius:.3g} {unit}{where}."
+    plot = axis.panel(f"error [{unit}]", (-height, height))
     source = table(t, error, {"y": error, "low": -reach, "high": reach})
     draw_band(plot, source, "low", "high", BELIEVED)
     draw_level(plot, 0.0, GREY, "solid")
     tips = {
         "t": "@t{0.00} s",
-        "error": f"@y{{0.00000}} {quantity.unit}",
-        "3 σ": f"±@high{{0.00000}} {quantity.unit}",
+        "error": f"@y{{0.000}} {unit}",
+        "3 σ": f"±@high{{0.000}} {unit}",
     }
     hover(plot, draw_line(plot, source, "y", BELIEVED, width=1.1), tips)
     if certified:
-        keys.append(draw_certified(plot, data, quantity.name, of_error=True))
+        keys.append(draw_certified(plot, data, quantity.name, scale, of_error=True))
     if bound is not None:
-        label = f"largest judged error {_RATES[quantity.name]}" if quantity.name in _RATES else "bound"
-        says += f" {label[0].upper()}{label[1:]}: {_range(bound, quantity.unit)}"
+        label = (
+            f"largest judged error {SYMBOLS[_RATES[quantity.name]]}" if quantity.name in _RATES else "bound"
+        )
+        says += f" {label[0].upper()}{label[1:]}: {_range(bound, unit)}"
         says += "." if drawn else ", outside the picture."
         if drawn:
             sides = table(_judged(data), bound, {"high": bound, "low": -bound})
@@ -149,9 +167,9 @@ def _error(
                 draw_line(plot, sides, side, BOUND, width=1.0)
             keys.append(Key(label, BOUND))
         at_samples = errors_at(data.columns.samples, data.columns.true).get(quantity.name)
-        broken = None if at_samples is None else outside(np.abs(at_samples), bound)
+        broken = None if at_samples is None else outside(np.abs(at_samples), bound / scale)
         if at_samples is not None and broken is not None and np.any(broken):
-            _mark(plot, _judged(data)[broken], at_samples[broken], height)
+            _mark(plot, _judged(data)[broken], scale * at_samples[broken], height)
             keys.append(Key(f"violated ({np.count_nonzero(broken)})", BOUND, "cross"))
             says += f" Violated in {np.count_nonzero(broken)} of {len(bound)} samples."
     return Panel(f"Error of {quantity.symbol}", says, tuple(keys), plot)
@@ -165,12 +183,13 @@ def _judged(data: PlotData) -> FloatArray:
     return data.seconds(data.columns.samples.capture_ns)
 
 
-def _bound(data: PlotData, name: str) -> FloatArray | None:
-    """Bound of a quantity's error at every judged sample; of rates what the other bounds rest on."""
+def _bound(data: PlotData, name: str, scale: float) -> FloatArray | None:
+    """Scaled bound of a quantity's error at every judged sample; of rates what the other bounds rest on."""
     if name in _RATES and data.worst is not None:
         rate = np.asarray(getattr(data.worst.rates, _RATES[name]), dtype=np.float64)
-        return np.broadcast_to(rate, (len(data.columns.samples.capture_ns),))
-    return data.bounds.get(name + data.drawn_bound)
+        return np.broadcast_to(scale * rate, (len(data.columns.samples.capture_ns),))
+    bound = data.bounds.get(name + data.drawn_bound)
+    return None if bound is None else scale * bound
 
 
 def _limits(data: PlotData, quantity: _Quantity, value: FloatArray, true: FloatArray) -> tuple[float, float]:
@@ -179,7 +198,8 @@ def _limits(data: PlotData, quantity: _Quantity, value: FloatArray, true: FloatA
     if quantity.name == "v1":
         return limits_around(value, true, floor=0.0, ceiling=1.8 * max(leader.k_v, float(np.median(value))))
     if quantity.name == "u1":
-        return limits_around(value, true, floor=-2.0 * leader.k_u, ceiling=2.0 * leader.k_u)
+        most = 2.0 * quantity.scale * leader.k_u
+        return limits_around(value, true, floor=-most, ceiling=most)
     return limits_around(value, true)
 
 

@@ -10,34 +10,24 @@ from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
 from hil.figures.plot_data import LONGEST_LINE, PlotData
 from hil.judge.columns import inside
+from hil.judge.summary import percentile
+from hil.reports.colours import BELIEVED, BLACK, BOUND, FOLLOWER, GREY, PURPLE
 from hil.reports.decimation import decimated_rows
 from hil.reports.intervals import intervals_of
 from hil.reports.plot_models import Field, Model, Value, source_of
-from hil.reports.plots import (
-    BELIEVED,
-    BOUND,
-    FOLLOWER,
-    GREY,
-    PURPLE,
-    Key,
-    Panel,
-    TimeAxis,
-    draw_level,
-    draw_line,
-    draw_marks,
-    hover,
-    marks,
-    table,
-)
+from hil.reports.plots import Key, Panel, TimeAxis, draw_level, draw_line, draw_marks, hover, marks, table
 
 _STATUS_COLOURS = {
     Status.INITIALISING: GREY,
     Status.TRACKING: BELIEVED,
     Status.COASTING: PURPLE,
     Status.REJECTING: BOUND,
-    Status.LOST: "#222222",
+    Status.LOST: BLACK,
 }
 _EXPECTED_NIS = 2.0
+_PERCENTILES = {"median": 50.0, "99 %": 99.0, "largest": 100.0}
+_WIDE = 8.0
+"""From where on the oldest is so many times the usual age that a linear axis would hide the rest."""
 _ROW_HEIGHT, _AXIS_HEIGHT = 30, 90
 
 
@@ -69,7 +59,7 @@ def status_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
         tips = {"status": "@row", "from": "@from{0.00} s", "to": "@to{0.00} s", "estimates": "@count"}
         hover(plot, bars, tips, mode="mouse")
     shares = ", ".join(f"{s.name.lower()} {statuses.count(s) / len(statuses):.1%}" for s in occurring)
-    return Panel("Status", f"What the estimates said of themselves: {shares}.", (), plot)
+    return Panel("Status", f"What the estimates said of themselves: {shares}.", (), plot, anchor="status")
 
 
 def nis_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
@@ -103,20 +93,35 @@ def nis_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
 
 
 def latency_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
-    """Age of what every command rests on; the first command on a capture gives the latency."""
+    """Age of what every command rests on; the first command on a capture gives the latency.
+
+    Nothing is cut off: where the oldest is many times the usual one, the axis is logarithmic.
+    """
     commands = data.columns.commands
     based = inside(commands.issued_ns, data.columns.run) & (commands.capture_ns > 0)
     if not np.any(based):
         return None
     t = data.seconds(commands.issued_ns[based])
     age_ms: FloatArray = (commands.issued_ns - commands.capture_ns)[based] * np.float64(1e-6)
-    plot = axis.panel("age [ms]", (0.0, 1.15 * float(np.max(age_ms))))
+    fresh = commands.fresh[based]
+    known = age_ms[fresh] if np.any(fresh) else age_ms
+    levels = {name: percentile(known, q) for name, q in _PERCENTILES.items()}
+    least, most = float(np.min(age_ms)), float(np.max(age_ms))
+    logarithmic = least > 0.0 and most > _WIDE * levels["median"]
+    plot = axis.panel("age [ms]", (0.8 * least, 1.4 * most) if logarithmic else (0.0, 1.15 * most))
+    if logarithmic:
+        plot.make_logarithmic()
     line = draw_line(plot, table(t, age_ms, {"y": age_ms}), "y", FOLLOWER, width=1.0)
     hover(plot, line, {"t": "@t{0.00} s", "age": "@y{0.0} ms"})
     keys = [Key("age of the capture behind every command", FOLLOWER)]
-    fresh = commands.fresh[based]
     if np.any(fresh):
-        rows = decimated_rows(age_ms[fresh])
-        draw_marks(plot, marks(t[fresh][rows], age_ms[fresh][rows]), "circle", BELIEVED, 3.0)
+        rows = decimated_rows(known)
+        draw_marks(plot, marks(t[fresh][rows], known[rows]), "circle", BELIEVED, 3.0)
         keys.append(Key("latency: first command on a capture", BELIEVED, "dot"))
-    return Panel("Latency and age", "How old the motion capture behind the commands was.", tuple(keys), plot)
+    for (name, level), dash in zip(levels.items(), ("dashed", "dotted", "solid"), strict=True):
+        draw_level(plot, level, GREY, dash)
+        keys.append(Key(f"{name} {level:.1f} ms", GREY, dash if dash != "solid" else "line"))
+    says = "How old the motion capture behind the commands was; all of it is in the picture."
+    if logarithmic:
+        says += " The axis is logarithmic."
+    return Panel("Latency and age", says, tuple(keys), plot)

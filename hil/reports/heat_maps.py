@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from bokeh.palettes import Cividis256
 
+from hil.reports.colours import DARK
 from hil.reports.plot_models import Field, Model, Value, source_of
-from hil.reports.plots import DARK, Panel, blank, hover
+from hil.reports.plots import Panel, blank, hover
 from hil.reports.run_tables import QUANTITIES, scale_of
 
 Cell = Mapping[str, Any]

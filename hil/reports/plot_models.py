@@ -92,6 +92,11 @@ class Figure(Model):
         self.attributes["renderers"].append(renderer)
         return renderer
 
+    def make_logarithmic(self) -> None:
+        """Give it a logarithmic y axis."""
+        self.y_axis.kind = "LogAxis"
+        self.set(y_scale=Model("LogScale"))
+
     def add_tools(self, *tools: Model) -> None:
         """Give the reader more tools."""
         self.attributes["toolbar"].attributes["tools"].extend(tools)

@@ -11,12 +11,10 @@ import numpy as np
 
 from formation.angles import FloatArray
 from hil.figures.plot_data import LONGEST_LINE
+from hil.reports.colours import AXIS, DARK, GREY, GRID, SHADE
 from hil.reports.decimation import decimated_rows
+from hil.reports.page_script import NOW
 from hil.reports.plot_models import DASHES, Field, Figure, Model, Value, source_of
-
-# Colours of Okabe and Ito, told apart by eyes of every kind; bounds and limits differ by their dashes, too.
-BLUE, VERMILION, PURPLE, DARK, GREY = "#0072b2", "#d55e00", "#a8478a", "#333333", "#767676"
-LEADER, FOLLOWER, BELIEVED, BOUND, ORBIT, TRUE, LIMIT = BLUE, VERMILION, BLUE, VERMILION, PURPLE, DARK, GREY
 
 HEIGHT = 210
 _FONT = "system-ui, sans-serif"
@@ -33,13 +31,17 @@ class Key:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Panel:
-    """A plot with its title, a sentence that says what it shows, and its legend; ``tall``: two rows high."""
+    """A plot with its title, a sentence that says what it shows, and its legend; ``tall``: two rows high.
+
+    ``anchor``: its place in the page, where links lead to it.
+    """
 
     title: str
     says: str
     keys: tuple[Key, ...]
     plot: Figure
     tall: bool = False
+    anchor: str = ""
 
 
 class TimeAxis:
@@ -52,6 +54,9 @@ class TimeAxis:
         self.first, self.last, self.judged_from = first, last, judged_from
         self._range = Model("Range1d", start=first, end=last if last > first else first + 1.0)
         self._cursor = Model("Span", dimension="height", line_color=GREY, line_dash=DASHES["dotted"])
+        self._now = Model(
+            "Span", name=NOW, dimension="height", level="overlay", location=last, line_color=DARK
+        )
 
     def panel(self, y_label: str, y: tuple[float, float] | Sequence[str], height: int = HEIGHT) -> Figure:
         """An empty plot over this time; ``y``: its limits, or the names of its rows."""
@@ -63,13 +68,15 @@ class TimeAxis:
         plot.add_tools(
             Model("PanTool", dimensions="width"),
             Model("BoxZoomTool", dimensions="width"),
+            Model("WheelZoomTool", dimensions="width"),
             Model("ResetTool"),
             Model("CrosshairTool", overlay=self._cursor),
         )
+        plot.add_layout(self._now)
         if self.judged_from > self.first and isinstance(y, tuple):
             across = [self.first, self.judged_from, self.judged_from, self.first]
             up = [y[0], y[0], y[1], y[1]]
-            looks = {"fill_color": "#000000", "fill_alpha": 0.04, "line_alpha": 0.0, "level": "image"}
+            looks = {"fill_color": SHADE, "fill_alpha": 0.05, "line_alpha": 0.0, "level": "image"}
             plot.add_layout(Model("PolyAnnotation", xs=across, ys=up, **looks))
         return plot
 
@@ -84,7 +91,7 @@ def blank(*, height: int, x_label: str, y_label: str, x_range: Model, y_range: M
         y_label=y_label,
         min_width=240,  # a first layout without any width would leave traces of its labels
         sizing_mode="stretch_width",
-        toolbar_location="above",
+        toolbar_location=None,
         background_fill_color=None,
         border_fill_color=None,
         outline_line_color=None,
@@ -101,11 +108,11 @@ def blank(*, height: int, x_label: str, y_label: str, x_range: Model, y_range: M
             axis_label_text_color=DARK,
             major_label_text_color=DARK,
             axis_label_standoff=4,
-            axis_line_color="#bbbbbb",
+            axis_line_color=AXIS,
             minor_tick_line_color=None,
         )
     for grid in plot.grids:
-        grid.set(grid_line_color="#e4e4e4")
+        grid.set(grid_line_color=GRID)
     return plot
 
 

@@ -1,4 +1,4 @@
-"""The figures of a summary as tables; whatever else a summary holds is listed under its own name."""
+"""The figures of a summary as tables, by the part of the page where they belong."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import degrees
 from typing import Any
 
+from hil.reports.certificate_table import certificate_html
+from hil.reports.figure_labels import BOUNDED, LABELS
 from hil.reports.intervals import TimeInterval
+from hil.reports.notation import written
 from hil.reports.page import table_html
 
 QUANTITIES = {
@@ -18,97 +21,62 @@ QUANTITIES = {
 }
 """Symbol and unit in tables of every estimated quantity."""
 _FORMS = {"extended": "{}_extended", "sound": "{}", "as in the paper": "paper_{}"}
-_BOUNDED = {"v1": "v₁", "alpha1": "α₁", "h": "h"}
-_SCALARS = (
-    ("estimation.evaluated_from_s", "judged from", "s", 1.0),
-    ("estimation.untracked", "did not say tracking", "", 1.0),
-    ("estimation.settle_s", "settled after", "s", 1.0),
-    ("estimation.nis_mean", "mean NIS (2 expected)", "", 1.0),
-    ("bounds.M_rho", "largest error of ρ̇ seen, M_rho", "mm/s", 1e3),
-    ("bounds.M_alpha2", "largest error of α̇₂ seen, M_alpha2", "deg/s", degrees(1.0)),
-    ("bounds.v_eps", "leader's least speed, v_eps", "mm/s", 1e3),
-    ("bounds.published.median.v1", "published bound of v₁, median", "mm/s", 1e3),
-    ("bounds.published.median.alpha1", "published bound of α₁, median", "deg", degrees(1.0)),
-    ("bounds.published.median.h", "published bound of h, median", "rad/s", 1.0),
-    ("bounds.published.violations.v1", "v₁ outside its published bound", "", 1.0),
-    ("bounds.published.violations.alpha1", "α₁ outside its published bound", "", 1.0),
-    ("bounds.published.violations.h", "h outside its published bound", "", 1.0),
-    ("formation.rho_min", "ρ, least", "m", 1.0),
-    ("formation.rho_max", "ρ, largest", "m", 1.0),
-    ("formation.rho_final", "ρ at the end", "m", 1.0),
-    ("formation.alpha1_final", "α₁ at the end", "deg", degrees(1.0)),
-    ("formation.alpha2_final", "α₂ at the end", "deg", degrees(1.0)),
-    ("formation.equilibrium_deviation_rms.rho", "ρ off ρ₀, RMS", "mm", 1e3),
-    ("formation.equilibrium_deviation_rms.alpha1", "α₁ off its station, RMS", "deg", degrees(1.0)),
-    ("formation.orbit_deviation_rms.rho", "ρ off the noise-free run, RMS", "mm", 1e3),
-    ("formation.orbit_deviation_rms.alpha1", "α₁ off the noise-free run, RMS", "deg", degrees(1.0)),
-    ("certified.certified", "certified", "", 1.0),
-    ("certified.v1.median", "radius of v₁, median", "mm/s", 1e3),
-    ("certified.v1.largest", "radius of v₁, largest", "mm/s", 1e3),
-    ("certified.v1.tightness", "largest error / radius of v₁", "", 1.0),
-    ("certified.v1.violations", "v₁ outside its radius", "", 1.0),
-    ("certified.alpha1.median", "radius of α₁, median", "deg", degrees(1.0)),
-    ("certified.alpha1.largest", "radius of α₁, largest", "deg", degrees(1.0)),
-    ("certified.alpha1.tightness", "largest error / radius of α₁", "", 1.0),
-    ("certified.alpha1.violations", "α₁ outside its radius", "", 1.0),
-    ("latency_ms.capture_to_command.p50", "capture to command, median", "ms", 1.0),
-    ("latency_ms.capture_to_command.p99", "capture to command, 99 %", "ms", 1.0),
-    ("latency_ms.capture_to_command.max", "capture to command, largest", "ms", 1.0),
-)
-_COUNTS = {
-    "estimation": "Estimates",
-    "bounds": "Bounds",
-    "formation": "Formation",
-    "certified": "Certified estimates",
-    "latency_ms": "Latency",
+_PARTS = {
+    "Estimates": "estimates",
+    "Largest errors seen": "bounds",
+    "Inputs err as little as assumed, of the samples": "bounds",
+    "Certified estimates": "bounds",
+    "Formation": "formation",
+    "Commands": "commands",
 }
 _MOST_STOPS = 20
 _Columns = Mapping[str, tuple[str, Callable[[Any], str]]]
-_CERTIFICATE, _WORDS = "certificate", ("why", "assumes")
-_HEAD = (
-    "scenario",
-    "seed",
-    "mode",
-    "estimator",
-    "law",
-    "duration_s",
-    "log.path",
-    "log.messages",
-    "log.bytes",
-    "findings",
+_COUNTS = {
+    "rejected": ("latency", "Inputs refused, by cause"),
+    "certified.failed": ("bounds", "Not certified, by the assumption that failed"),
+}
+_ELSEWHERE = (
+    *("scenario", "seed", "mode", "estimator", "law", "duration_s", "truth", "findings", "orders_refused"),
+    *("log.", "law.", "parity.", "stopped_by."),
 )
-"""What the head of the page says."""
+"""What other parts of the page say."""
 
 
-def summary_tables(summary: Mapping[str, Any]) -> str:
-    """Tables of all figures of a summary, with units; what the summary lacks is not there."""
-    left = dict(_leaves(summary, ""))
-    for name in _HEAD:
-        left.pop(name, None)
-    tables = [*_estimates(left), _bounds(left)]
-    for group, caption in _COUNTS.items():
+def summary_tables(summary: Mapping[str, Any]) -> dict[str, str]:
+    """Tables of all figures of a summary by section; what is not there is left out.
+
+    Sections: ``estimates``, ``bounds``, ``formation``, ``commands``, ``latency``, ``certificate``, and
+    ``others``, of what nobody has words for.
+    """
+    certificate = summary.get("certificate", {})
+    known = {name: value for name, value in summary.items() if name != "certificate"}
+    left = {path: value for path, value in _leaves(known, "") if not _said_elsewhere(path)}
+    tables: dict[str, list[str]] = {
+        "estimates": _estimates(left),
+        "bounds": [_published(left), *_bounds(left)],
+    }
+    for caption, labels in LABELS.items():
         rows = [
-            (label, _number(scale * left.pop(path)), unit)
-            for path, label, unit, scale in _SCALARS
-            if path in left and path.startswith(group)
+            (label.words, _number(label.scale * left.pop(path)), label.unit)
+            for path, label in labels.items()
+            if path in left
         ]
-        tables.append(table_html(caption, ("", "value", "unit"), rows))
-    for group, caption in (("frames", "Frames"), ("commands", "Commands"), ("rejected", "Inputs refused")):
+        tables.setdefault(_PARTS.get(caption, "latency"), []).append(
+            table_html(caption, ("", "value", "unit"), rows)
+        )
+    for group, (part, caption) in _COUNTS.items():
         counts = [
-            (path.partition(".")[2].replace("_", " "), _text(left.pop(path)))
+            (path.removeprefix(f"{group}.").replace("_", " "), _text(left.pop(path)))
             for path in list(left)
             if path.startswith(f"{group}.")
         ]
-        tables.append(table_html(caption, ("", "count"), counts))
-    guaranteed = _certificate(left)
-    rest = [(path, _text(value)) for path, value in left.items()]
-    further = table_html("By their names in summary.json, in SI units", ("", "value"), rest, long=True)
-    return (
-        '<div class="tables">\n'
-        + "\n".join(filter(None, tables))
-        + f"\n</div>\n{guaranteed}"
-        + (f"<details><summary>Further figures</summary>{further}</details>" if rest else "")
-    )
+        tables.setdefault(part, []).append(table_html(caption, ("", "count"), counts))
+    told = {part: _side_by_side(each) for part, each in tables.items()}
+    rest = [(_in_words(path), _text(value)) for path, value in left.items()]
+    return told | {
+        "certificate": certificate_html(certificate),
+        "others": table_html("In SI units", ("", "value"), rest, long=True),
+    }
 
 
 def stops_table(stops: Sequence[TimeInterval]) -> str:
@@ -163,37 +131,65 @@ def _by_quantity(left: dict[str, Any], caption: str, columns: _Columns) -> str:
     return table_html(caption, ("", *(label for label, _ in held.values())), rows)
 
 
-def _bounds(left: dict[str, Any]) -> str:
-    """Violations and tightness of every bound."""
-    rows = []
+def _published(left: dict[str, Any]) -> str:
+    """The bounds that estimates went out with."""
+    path, rows = "bounds.published", []
+    checked = left.pop(f"{path}.checked", None)
+    for name, label in BOUNDED.items():
+        median = left.pop(f"{path}.median.{name}", None)
+        shares = [left.pop(f"{path}.{what}.{name}", None) for what in ("says_something", "tightness")]
+        violated = left.pop(f"{path}.violations.{name}", None)
+        if median is not None:
+            figures = (_number(label.scale * median), _share(shares[0]), _count(violated), _share(shares[1]))
+            rows.append((f"{label.words} [{label.unit}]", *figures))
+    over = "" if checked is None else f", checked in {checked} samples"
+    header = ("", "median", "says something", "violated in", "largest error / bound")
+    return table_html(f"Bounds as published with the estimates{over}", header, rows)
+
+
+def _bounds(left: dict[str, Any]) -> Iterator[str]:
+    """Violations and tightness of every bound, by the largest errors seen and by those assumed."""
+    seen, assumed = [], []
     for form, pattern in _FORMS.items():
-        for name, symbol in _BOUNDED.items():
-            key = pattern.format(name)
-            broken = left.pop(f"bounds.violations.{key}", None)
-            tightness = left.pop(f"bounds.tightness.{key}", None)
+        for name, label in BOUNDED.items():
+            key, what = pattern.format(name), f"{label.words}, {form}"
+            broken, used = _verdict_on(left, "bounds", key)
             if broken is not None:
-                largest = "–" if tightness is None else f"{tightness:.1%}"
-                rows.append((f"{symbol}, {form}", str(broken), largest))
-    caption = f"Bounds of the errors, checked in {left.pop('bounds.checked', 0)} samples"
-    return table_html(caption, ("", "violated in", "largest error / bound"), rows)
-
-
-def _certificate(left: dict[str, Any]) -> str:
-    """What was guaranteed beforehand, or why nothing can be; what it rests on unfolds."""
-    parts: dict[str, dict[str, Any]] = {}
-    for path in [path for path in left if path.startswith(f"{_CERTIFICATE}.")]:
-        _, part, *rest = path.split(".")
-        parts.setdefault(part, {})[".".join(rest)] = left.pop(path)
-    rows, assumptions = [], []
-    for part, figures in parts.items():
-        numbers = [f"{name} {_text(value)}".strip() for name, value in figures.items() if name not in _WORDS]
-        rows.append((part.replace("_", " "), "; ".join(filter(None, [*numbers, figures.get("why")]))))
-        assumptions += [(part.replace("_", " "), _text(figures["assumes"]))] if "assumes" in figures else []
-    certificate = table_html("Guaranteed beforehand, in SI units", ("", "certificate"), rows, long=True)
-    rests_on = table_html("", ("", "assumes"), assumptions, long=True)
-    return certificate + (
-        f"<details><summary>What it rests on</summary>{rests_on}</details>" if rests_on else ""
+                seen.append((what, _count(broken), _share(used)))
+            held = left.pop(f"bounds.assumed.holds.{key}", None)
+            broken, used = _verdict_on(left, "bounds.assumed.where_inputs_hold", key)
+            if held is not None:
+                assumed.append((what, _share(held), _count(broken), _share(used)))
+    checked = left.pop("bounds.checked", 0)
+    yield table_html(
+        f"Bounds by the largest errors seen, checked in {checked} samples",
+        ("", "violated in", "largest error / bound"),
+        seen,
     )
+    where = left.pop("bounds.assumed.where_inputs_hold.samples", 0)
+    yield table_html(
+        f"Bounds by the errors assumed; the last two in the {where} samples whose inputs kept to them",
+        ("", "held in", "violated in", "largest error / bound"),
+        assumed,
+    )
+
+
+def _verdict_on(left: dict[str, Any], path: str, key: str) -> tuple[int | None, float | None]:
+    return left.pop(f"{path}.violations.{key}", None), left.pop(f"{path}.tightness.{key}", None)
+
+
+def _side_by_side(tables: Sequence[str]) -> str:
+    filled = "\n".join(filter(None, tables))
+    return f'<div class="tables">\n{filled}\n</div>' if filled else ""
+
+
+def _said_elsewhere(path: str) -> bool:
+    return any(path == name or (name.endswith(".") and path.startswith(name)) for name in _ELSEWHERE)
+
+
+def _in_words(path: str) -> str:
+    """The path of a figure that nobody has words for."""
+    return written(path.replace(".", ", ")).replace("_", " ")
 
 
 def _leaves(value: object, path: str) -> Iterator[tuple[str, Any]]:
@@ -205,7 +201,16 @@ def _leaves(value: object, path: str) -> Iterator[tuple[str, Any]]:
         yield path, value
 
 
+def _count(count: int | None) -> str:
+    return "–" if count is None else str(count)
+
+
+def _share(share: float | None) -> str:
+    return "–" if share is None else f"{share:.1%}"
+
+
 def _number(value: float) -> str:
+    value += 0.0  # minus zero is zero
     return f"{value:.3g}" if abs(value) < 1000.0 else f"{value:.0f}"
 
 

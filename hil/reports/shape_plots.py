@@ -10,25 +10,16 @@ from numpy.typing import NDArray
 from formation.angles import FloatArray
 from hil.figures.plot_data import PlotData, broken_at_jumps
 from hil.judge.columns import inside
-from hil.reports.plots import (
-    BELIEVED,
-    GREY,
-    ORBIT,
-    TRUE,
-    Key,
-    Panel,
-    TimeAxis,
-    draw_line,
-    hover,
-    limits_around,
-    marks,
-    table,
-)
+from hil.reports.colours import BELIEVED, GREY, ORBIT, TRUE
+from hil.reports.plots import Key, Panel, TimeAxis, draw_line, hover, limits_around, marks, table
 
+_DEGREES = math.degrees(1.0)
+COURSE = "course "
+"""What the names of the data of shape variables begin with."""
 _SHAPES = (
     ("rho", "ρ", "m", "Distance ρ", "The distance between the robots."),
-    ("alpha1", "α₁", "rad", "Bearing α₁", "Where the leader sees the follower, from its own heading."),
-    ("alpha2", "α₂", "rad", "Bearing α₂", "Where the follower sees the leader, from its own heading."),
+    ("alpha1", "α₁", "deg", "Bearing α₁", "Where the leader sees the follower, from its own heading."),
+    ("alpha2", "α₂", "deg", "Bearing α₂", "Where the follower sees the leader, from its own heading."),
 )
 
 
@@ -71,22 +62,25 @@ def _panels(
     since, desired = data.desired()
     panels = []
     for k, (name, symbol, unit, title, says) in enumerate(_SHAPES):
-        held = {"y": broken_at_jumps(courses[k])}
+        scale = 1.0 if unit == "m" else _DEGREES
+        held = {"y": scale * broken_at_jumps(courses[k])}
         if ideals is not None:
-            held["ideal"] = broken_at_jumps(ideals[k])
-        level = [desired[k]] if driven else []
-        floor = 0.0 if name == "rho" else -math.pi
+            held["ideal"] = scale * broken_at_jumps(ideals[k])
+        level = [scale * desired[k]] if driven else []
+        floor = 0.0 if name == "rho" else -180.0
         plot = axis.panel(f"{symbol} [{unit}]", limits_around(*held.values(), *level, floor=floor))
         source = table(t, held["y"], held)
-        keys, tips = [Key(label, colour)], {"t": "@t{0.00} s", label: f"@y{{0.0000}} {unit}"}
+        source.set(name=COURSE + name)
+        digits = "0.0000" if unit == "m" else "0.00"
+        keys, tips = [Key(label, colour)], {"t": "@t{0.00} s", label: f"@y{{{digits}}} {unit}"}
         if driven:
-            draw_line(plot, marks(since, desired[k]), "y", GREY, dash="dotted")
-            at = ", ".join(f"{value:.4g}" for value in dict.fromkeys(desired[k].tolist()))
+            draw_line(plot, marks(since, level[0]), "y", GREY, dash="dotted")
+            at = ", ".join(f"{value:.4g}" for value in dict.fromkeys(level[0].tolist()))
             keys.append(Key(f"station, {at} {unit}", GREY, "dotted"))
         if ideals is not None:
             draw_line(plot, source, "ideal", ORBIT, dash="dashed")
             keys.append(Key("noise-free run", ORBIT, "dashed"))
-            tips["noise-free"] = f"@ideal{{0.0000}} {unit}"
+            tips["noise-free"] = f"@ideal{{{digits}}} {unit}"
         hover(plot, draw_line(plot, source, "y", colour), tips)
         panels.append(Panel(title, says, tuple(keys), plot))
     return panels

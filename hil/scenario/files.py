@@ -137,6 +137,20 @@ def scenario_text(scenario: Scenario) -> str:
     return tomli_w.dumps(msgspec.to_builtins(scenario))
 
 
+def changes_from_shipped(scenario: Scenario) -> dict[str, str] | None:
+    """What makes this scenario of the one that is shipped under its name: keys with their values as TOML.
+
+    None where there is no such scenario, or one with keys that this one lacks.
+    """
+    if scenario.name not in scenario_names():
+        return None
+    shipped = dict(_leaves(msgspec.to_builtins(load_scenario(scenario.name))))
+    own = dict(_leaves(msgspec.to_builtins(scenario)))
+    if not shipped.keys() <= own.keys():
+        return None
+    return {key: _toml(value) for key, value in own.items() if key not in shipped or shipped[key] != value}
+
+
 def with_overrides(scenario: Scenario, *overrides: Overrides) -> Scenario:
     """Return the scenario with ``section.key=value`` overrides applied, in their order, and checked."""
     return build_scenario(msgspec.to_builtins(scenario), *overrides, source=f"scenario {scenario.name}")
@@ -182,7 +196,7 @@ def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
 
 
 def _toml(value: Any) -> str:
-    return tomli_w.dumps({"value": value}).partition("=")[2].strip()
+    return " ".join(tomli_w.dumps({"value": value}).partition("=")[2].split())
 
 
 def _place(tree: dict[str, Any], key: str, source: str) -> tuple[dict[str, Any], str]:

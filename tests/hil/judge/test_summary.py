@@ -3,6 +3,7 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -165,6 +166,26 @@ def test_commands_after_the_stop_do_not_count(exact_run_data: RunData) -> None:
     ]
     found = summarise(replace(exact_run_data, commands=commands, stopped_ns=middle))
     assert found["commands"] == {"sent": 100, "saturated": 30, "stopped": 5}
+
+
+@pytest.mark.parametrize(
+    ("waits", "stops", "counted"),
+    [
+        (range(40), (), 0),
+        (range(40), range(60, 65), 5),
+        (range(1000), (), 100),
+    ],
+)
+def test_a_robot_stands_still_only_once_it_was_driven_or_if_it_never_was(
+    exact_run_data: RunData, waits: Sequence[int], stops: Sequence[int], counted: int
+) -> None:
+    middle = to_ns(exact_run_data.commands[100].header.stamp)
+    commands = [
+        replace(each, stop="no estimate" if number in waits else "stale" if number in stops else "")
+        for number, each in enumerate(exact_run_data.commands)
+    ]
+    found = summarise(replace(exact_run_data, commands=commands, stopped_ns=middle))
+    assert found["commands"]["stopped"] == counted
 
 
 def test_frames_add_up(exact_run_data: RunData) -> None:

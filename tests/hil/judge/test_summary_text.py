@@ -73,7 +73,7 @@ def test_certified_radii_are_told(summary: dict[str, Any]) -> None:
         (
             "commands",
             {"stopped": 24, "sent": 240},
-            "in 10% of the commands the robot was told to stand still",
+            "in 10% of the commands the robot was told to stand still after its first drive",
         ),
         ("formation", {"orbit_deviation_rms": {"rho": 0.3}}, "the distance is 0.3 m RMS off"),
         ("rejected", {"not_finite": 3, "gated": 1}, "inputs refused: gated 1, not finite 3"),
