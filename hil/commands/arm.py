@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hil.commands.wire_options import endpoints_of, wire_options
+from hil.log.report_json import note, say
 
 if TYPE_CHECKING:
     from hil.live.guards_heard import GuardsHeard
@@ -61,10 +62,10 @@ def command(
         raise CheckFailedError(f"no guard {whom} was heard; start abreast guard on the robot")
     for name, text in guards.held.items():
         if text and robot in ("", name):
-            click.echo(f"abreast arm: {name}: {text}", err=True)
+            note(f"abreast arm: {name}: {text}")
     if not guards.are_armed(robot):
         sys.exit(1)
-    click.echo(f"abreast arm: {robot or ', '.join(guards.held)} may be driven again", err=True)
+    say(f"{robot or ', '.join(guards.held)} may be driven again")
 
 
 def _hear(wire: Wire, guards: GuardsHeard) -> None:

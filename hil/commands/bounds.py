@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-
 import click
 
-from hil.log.report_json import print_json
+from hil.log.report_json import print_json, result_console
 from hil.scenario.files import load_scenario
 
 
@@ -16,7 +14,6 @@ from hil.scenario.files import load_scenario
 @click.option("--json", "as_json", is_flag=True, help="Print the certificate as one JSON object.")
 def command(scenario: str, overrides: tuple[str, ...], as_json: bool) -> None:
     """Print the certificate of SCENARIO: bounds on rates, estimates and formation, and what they assume."""
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
@@ -31,7 +28,7 @@ def command(scenario: str, overrides: tuple[str, ...], as_json: bool) -> None:
     for title, finding, assumes in certificate_lines(certificate):
         marks = " ".join(f"[{assumptions.setdefault(text, len(assumptions) + 1)}]" for text in assumes)
         table.add_row(Text(title, style="bold"), Text.assemble(finding, (f"  {marks}", "dim")))
-    console = Console(file=sys.stderr)
+    console = result_console()
     console.print(table)
     console.print(Text("assuming"))
     for text, number in assumptions.items():

@@ -12,6 +12,7 @@ from formation.collector import collector_paused
 from hil.bridge.seen_frame import Up
 from hil.commands.seconds import DURATION
 from hil.commands.wire_options import endpoints_of, wire_options
+from hil.log.report_json import note
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
 
@@ -123,4 +124,4 @@ def _run(
 
 
 def _say(line: str) -> None:
-    click.echo(f"abreast bridge: {line}", err=True)
+    note(f"abreast bridge: {line}")

@@ -10,7 +10,7 @@ import click
 
 from hil.commands.seconds import Seconds
 from hil.errors import UsageError
-from hil.log.report_json import print_with_nulls
+from hil.log.report_json import print_with_nulls, say
 
 if TYPE_CHECKING:
     from estimation.calibration.sensor_bias import SensorBias
@@ -84,18 +84,17 @@ def _say_mounts(found: Mounts) -> None:
 
     if not found.known:
         return
-    click.echo(said("leader", found), err=True)
-    click.echo(said("follower", found), err=True)
+    say(said("leader", found))
+    say(said("follower", found))
     if None in (found.follower.x, found.follower.y, found.follower.yaw):
-        click.echo(
+        say(
             "what is not told takes half a minute with left and right turns; a follower that was stopped for "
             'its mount drives that with what is put in now, or with controller.mount_check = "warn"',
-            err=True,
         )
-    click.echo("put into the scenario:", err=True)
+    say("put into the scenario:")
     for key, mount in found.settings.items():
         section, _, name = key.partition(".")
-        click.echo(f"[{section}]\n{name} = [{', '.join(f'{value:g}' for value in mount)}]", err=True)
+        say(f"[{section}]\n{name} = [{', '.join(f'{value:g}' for value in mount)}]")
 
 
 def _say_noise(found: Mapping[str, float]) -> None:
@@ -103,45 +102,39 @@ def _say_noise(found: Mapping[str, float]) -> None:
     from hil.replay.noise_calibration import said_noise
 
     if found:
-        click.echo(
-            f"measurements scatter by, with which bounds and estimates begin:\n{said_noise(found)}", err=True
-        )
+        say(f"measurements scatter by, with which bounds and estimates begin:\n{said_noise(found)}")
 
 
 def _say_timing(found: Calibration) -> None:
     """Print the timing, what is unknown of it, and its settings."""
     for name, known in found.timing.items():
-        click.echo(f"{name:19} {known.value:+.4f} s give or take {known.sd:.4f}: {_MEANINGS[name]}", err=True)
+        say(f"{name:19} {known.value:+.4f} s give or take {known.sd:.4f}: {_MEANINGS[name]}")
     for line in found.unknown:
-        click.echo(line, err=True)
+        say(line)
     if found.uncertain:
-        click.echo("the offset of stamps is too uncertain to be set: drive for 30 s", err=True)
+        say("the offset of stamps is too uncertain to be set: drive for 30 s")
     if found.settings:
         options = " ".join(f"--set {key}={value:.4f}" for key, value in found.settings.items())
-        click.echo(f"run next with: {options}", err=True)
+        say(f"run next with: {options}")
 
 
 def _say_odometry(found: Mapping[str, Known | None]) -> None:
     """Print what the motion makes of odometry."""
     for name, known in found.items():
         if known is not None:
-            click.echo(
-                f"{name:21} {known.value:+.4f} give or take {known.sd:.4f}: {_RESPONSES[name]}", err=True
-            )
+            say(f"{name:21} {known.value:+.4f} give or take {known.sd:.4f}: {_RESPONSES[name]}")
 
 
 def _say_offsets(log: Path, found: SensorBias) -> None:
     """Print the offsets of a sensor and their settings."""
     offsets = {"range_bias": found.range, "bearing_bias": found.bearing}
     for (name, offset), unit in zip(offsets.items(), ("m", "rad"), strict=True):
-        click.echo(
+        say(
             f"{name:12} {offset.value:+.4f} {unit} give or take {offset.sd:.4f}; "
             f"single ones scatter by {offset.spread:.4f}",
-            err=True,
         )
     settings = " ".join(f"--set estimator.{name}={offset.value:.4f}" for name, offset in offsets.items())
-    click.echo(
+    say(
         f"from {found.samples} sightings, {found.outliers} of them outliers; go on with: "
         f"abreast replay {log} {settings}",
-        err=True,
     )

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import click
-
 from hil.errors import CheckFailedError
 from hil.judge.chain_pairs import driven_trajectory
 from hil.judge.chain_summary import summarise_chain
@@ -16,9 +14,9 @@ from hil.judge.replay_verdict import evaluated, print_fed, violated_bounds
 from hil.judge.replayed import Replayed
 from hil.judge.run_data import RunData, run_data_of_link
 from hil.log.reader import Log
-from hil.log.report_json import print_json, write_json
+from hil.log.report_json import note, print_json, say, write_json
 from hil.replay.estimate_csv import write_estimates
-from hil.reports.judged_log import made_folder
+from hil.reports.judged_log import made_folder, results_in
 from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
 
@@ -29,10 +27,10 @@ def judge_run(log: Log, scenario: Scenario, folder: Path) -> dict[str, Any]:
     summary = summarise_chain(scenario, runs)
     _write(scenario, runs, summary, folder, "run.png")
     print_chain(summary)
-    click.echo(
+    say(results_in(folder))
+    say(
         f"a page is made of one follower at a time: abreast replay {log.path} "
-        f"--follower {runs[-1].scenario.follower.name} --out DIR",
-        err=True,
+        f"--follower {runs[-1].scenario.follower.name} --out DIR"
     )
     return summary
 
@@ -48,6 +46,8 @@ def leave_replay(
         for run_data in done.runs:
             write_estimates(evaluated(run_data), out / f"estimates-{run_data.scenario.follower.name}.csv")
     print_chain(summary)
+    if out is not None:
+        say(results_in(out))
     if as_json:
         print_json(summary)
     if verify and (reason := done.why_not_same(log)):
@@ -62,7 +62,7 @@ def _write(
     write_json(summary, folder / "summary.json")
     trajectory = driven_trajectory(runs)
     if trajectory is None:
-        click.echo("no picture: the log does not tell where the robots really were", err=True)
+        note("no picture: the log does not tell where the robots really were")
         return
     from hil.figures.chain_figures import draw_chain
 

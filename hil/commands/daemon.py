@@ -15,6 +15,7 @@ from hil.commands.outputs import OutputFile
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION, Seconds
 from hil.commands.wire_options import endpoints_of, wire_options
+from hil.log.report_json import note
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario
 from hil.scenario.guarded import with_guards
@@ -68,7 +69,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
 
         def say_ready() -> None:
             whom = f" for {', '.join(followers)}" if followers else ""
-            click.echo(f"abreast {name}: ready{whom}, {chosen.name} on {endpoints.describe()}", err=True)
+            note(f"abreast {name}: ready{whom}, {chosen.name} on {endpoints.describe()}")
 
         prepare(types_of(chosen).values())
         dropped = run_daemon(
@@ -81,7 +82,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
             Presence(name, watch_of(name, order), overheard(name, order), on_report()),
         )
         if dropped:
-            click.echo(f"abreast {name}: {dropped} messages came too fast and were dropped", err=True)
+            note(f"abreast {name}: {dropped} messages came too fast and were dropped")
 
     options: list[click.Parameter] = [
         click.Argument(["scenario"]),

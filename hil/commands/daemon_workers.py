@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from hil.commands.natnet_options import NatNetOptions, served
 from hil.commands.own_parts import remarks_on
 from hil.errors import UsageError
+from hil.log.report_json import note
 from hil.scenario.links import Link
 from hil.scenario.schema import Scenario
 
@@ -74,7 +73,7 @@ def _emulator(order: Order) -> Worker:
         from hil.bridge.natnet_emulator import NatNetEmulator
 
         emulator = NatNetEmulator(node, order.natnet.serving(), on_report=on_report())
-        click.echo(f"abreast emulator: serves {served(emulator, order.natnet.natnet_address)}", err=True)
+        note(f"abreast emulator: serves {served(emulator, order.natnet.natnet_address)}")
         return emulator
     if not converts(order.scenario):
         return NodeWorker([node], on_report=on_report())
@@ -100,7 +99,7 @@ def serve_alone(order: Order, ending: Ending, duration_s: float | None) -> None:
 
     emulator = NatNetEmulator(EmulatorNode(order.scenario), order.natnet.serving(), alone=True)
     line = f"abreast emulator: ready, serves {served(emulator, order.natnet.natnet_address)}"
-    run_alone(emulator, ending, duration_s, lambda: click.echo(line, err=True))
+    run_alone(emulator, ending, duration_s, lambda: note(line))
 
 
 def _estimator(order: Order) -> Worker:
@@ -147,10 +146,7 @@ def on_report() -> Callable[[bytes], None]:
     """What says on stderr what nodes find and wait for, once when it begins and once when it ends."""
     from hil.live.finding_lines import FindingLines, ProblemLines
 
-    def say(line: str) -> None:
-        click.echo(line, err=True)
-
-    findings, problems = FindingLines(say), ProblemLines(say)
+    findings, problems = FindingLines(note), ProblemLines(note)
 
     def hear(payload: bytes) -> None:
         findings.hear(payload)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Iterator
@@ -14,6 +13,7 @@ import click
 from formation.collector import collector_paused
 from hil.commands.seconds import DURATION
 from hil.commands.wire_options import endpoints_of, wire_options
+from hil.log.report_json import note, print_with_nulls, result_console
 
 if TYPE_CHECKING:
     from hil.doctor.check import Check
@@ -55,7 +55,7 @@ def command(
     endpoints = endpoints_of(connect, listen, zenoh_config, secure, "operator")
     checks = [disk_check(out), *_visited(chosen, endpoints, duration, drive, findings)]
     if as_json:
-        click.echo(json.dumps({"checks": [each.as_dict() for each in checks], "findings": findings}))
+        print_with_nulls({"checks": [each.as_dict() for each in checks], "findings": findings})
     else:
         _show(checks)
     sys.exit(int(not all(each.ok for each in checks)))
@@ -114,7 +114,7 @@ def _visited(
 
 
 def _say(line: str) -> None:
-    click.echo(f"abreast doctor: {line}", err=True)
+    note(f"abreast doctor: {line}")
 
 
 def _place(endpoint: str) -> tuple[int, str]:
@@ -124,7 +124,6 @@ def _place(endpoint: str) -> tuple[int, str]:
 
 def _show(checks: list[Check]) -> None:
     """A table: what is well in few words, what is not with what to do."""
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
@@ -136,4 +135,4 @@ def _show(checks: list[Check]) -> None:
         table.add_row(mark, each.name, Text(each.seen), Text("" if each.ok else each.expected))
         if each.advice:
             table.add_row("", "", Text(each.advice, "bold"), "")
-    Console().print(table)
+    result_console().print(table)

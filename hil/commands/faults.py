@@ -12,7 +12,7 @@ import click
 
 from hil.commands.outputs import OutputFolder
 from hil.errors import CheckFailedError, UsageError
-from hil.log.report_json import print_json, print_text, results_apart
+from hil.log.report_json import note, print_json, print_text, results_apart
 
 if TYPE_CHECKING:
     from hil.faults.fault import Fault
@@ -68,7 +68,7 @@ def command(
     before = _before(out, ros) if add and out is not None else Session(ros=ros)
     interrupt_on_signals(once=True)
     how = Tries(tries, _domain() if ros else None, None if out is None else out / "wrong")
-    session = tried(chosen, how, lambda line: click.echo(line, err=True))
+    session = tried(chosen, how, note)
     session.cases = merged(before.cases, session.cases, faults())
     session.skipped = skipped_of([*before.skipped, *session.skipped], session.cases)
     _tell(session, out, as_json=as_json)

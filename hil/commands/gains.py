@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from hil.log.report_json import print_json
+from hil.log.report_json import print_json, say
 from hil.scenario.files import load_scenario
 
 
@@ -21,4 +21,4 @@ def command(scenario: str, overrides: tuple[str, ...], as_json: bool) -> None:
         print_json(proposal.as_dict())
         return
     for line in report_lines(proposal):
-        click.echo(line, err=True)
+        say(line)

@@ -9,6 +9,7 @@ import click
 
 from hil.commands.seconds import DURATION
 from hil.commands.wire_options import endpoints_of, wire_options
+from hil.log.report_json import say
 
 
 @click.command("guard", params=wire_options())
@@ -50,7 +51,7 @@ def command(
             write.write_text(order.as_text(), encoding="utf-8")
         except OSError as error:
             raise UsageError(f"--write {write}: {error.strerror or error}; give another file") from None
-        click.echo(f"abreast guard: wrote {write}; on {robot}: abreast-guard {write.name}", err=True)
+        say(f"wrote {write}; on {robot}: abreast-guard {write.name}")
         return
     endpoints = endpoints_of(connect, listen, zenoh_config, secure, "guard")
     serve(order, endpoints, ros=ros, duration_s=duration or math.inf)

@@ -10,6 +10,7 @@ import click
 
 from hil.commands.outputs import OutputFile, refuse_unwritable
 from hil.errors import AbreastError, UsageError
+from hil.log.report_json import note, say
 
 if TYPE_CHECKING:
     from hil.recordings.column_map import ColumnMap
@@ -100,16 +101,14 @@ def _chart(name: str, chart: str | None, scenario: str | None, overrides: tuple[
 
 def _tell(recording: str, log: Path, done: Imported) -> None:
     """Say what was found; exit 1 if a part of the recording is damaged."""
-    click.echo(f"{recording}: {done.taken_for}", err=True)
+    say(f"{recording}: {done.taken_for}")
     for role, rows in done.gaps.items():
-        click.echo(f"{recording}: {role} missing in {rows} of {done.rows} rows", err=True)
-    click.echo(
-        f"{log}: {done.rows} rows from {done.from_s:g} s to {done.to_s:g} s; "
-        f"go on with: abreast replay {log}",
-        err=True,
+        say(f"{recording}: {role} missing in {rows} of {done.rows} rows")
+    say(
+        f"{log}: {done.rows} rows from {done.from_s:g} s to {done.to_s:g} s; go on with: abreast replay {log}"
     )
     for doubt in done.doubts:
-        click.echo(f"! {doubt}", err=True)
+        note(f"! {doubt}")
     if done.damage:
         shown = "; ".join(done.damage[:_SHOWN])
         rest = f"; and {len(done.damage) - _SHOWN} more" if len(done.damage) > _SHOWN else ""
@@ -136,8 +135,7 @@ def import_mrclam_pair(
 
     done = import_mrclam(folder, leader, follower, out, sightings)
     kind = "frames" if sightings == "vicon" else "sightings"
-    click.echo(
+    say(
         f"{out}: {done.rows} {kind} from {done.from_s:.3f} s to {done.to_s:.3f} s; "
-        f"go on with: abreast replay {out}",
-        err=True,
+        f"go on with: abreast replay {out}"
     )

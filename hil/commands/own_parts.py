@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-import click
-
 from controllers.own_law import OwnLaw
 from hil.extensions.reference import is_reference, short
+from hil.log.report_json import note
 from hil.scenario.schema import Scenario
 
 
@@ -20,7 +19,7 @@ def remarks_on(laws: Iterable[OwnLaw | None]) -> Callable[[], None]:
         for law in known:
             if law.failures() and (failure := law.failure()) != said[law.name]:
                 said[law.name] = failure
-                click.echo(f"law {law.name} failed, the robot is told to stand still: {failure}", err=True)
+                note(f"law {law.name} failed, the robot is told to stand still: {failure}")
 
     return remark
 
@@ -36,9 +35,9 @@ def load_own_parts(scenario: Scenario, *, estimates: bool = True) -> None:
 
         own = law_of(scenario)
         if own is not None and own.why_not_compiled:
-            click.echo(f"law {own.name} runs interpreted: {own.why_not_compiled}", err=True)
+            note(f"law {own.name} runs interpreted: {own.why_not_compiled}")
     if estimates and is_reference(kind):
         from hil.scenario.leader_model import leader_filter
 
         leader_filter(scenario)
-        click.echo(f"estimator {short(kind)} runs interpreted", err=True)
+        note(f"estimator {short(kind)} runs interpreted")

@@ -9,7 +9,7 @@ import click
 
 from hil.commands.outputs import OutputFile
 from hil.errors import CheckFailedError
-from hil.log.report_json import print_json
+from hil.log.report_json import print_json, say
 
 if TYPE_CHECKING:
     from hil.log.recovery import Recovery
@@ -27,7 +27,7 @@ def command(log: Path, out: Path, as_json: bool) -> None:
     from hil.log.recovery import recover
 
     done = recover(log, out)
-    click.echo(f"{out}: {done.messages} messages, {done.bytes} bytes; {log} {_said(done)}", err=True)
+    say(f"{out}: {done.messages} messages, {done.bytes} bytes; {log} {_said(done)}")
     if as_json:
         print_json(
             {

@@ -11,8 +11,8 @@ from formation.collector import collector_paused
 from hil.commands.outputs import OutputFile, OutputFolder
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
-from hil.log.report_json import print_json, print_text, results_apart
-from hil.reports.judged_log import leave, made_folder
+from hil.log.report_json import note, print_json, print_text, results_apart, say
+from hil.reports.judged_log import leave, made_folder, results_in
 
 if TYPE_CHECKING:
     from hil.judge.replayed import Replayed
@@ -106,12 +106,14 @@ def command(
     print_fed(given, played)
     _write(run_data, summary, table, out)
     print_summary(summary)
+    if out is not None:
+        say(results_in(out))
     for name, what in (("commands", "commands to the robot"), ("certified", "certified estimates")):
         if name in played.parity and (unrecorded := played.parity[name].unrecorded):
-            click.echo(f"{unrecorded} {what} are not in the log: the recorder missed them", err=True)
+            note(f"{unrecorded} {what} are not in the log: the recorder missed them")
     for name, restarts in played.restarts.items():
         if restarts:
-            click.echo(f"the {name} was started again during the run (times: {restarts})", err=True)
+            note(f"the {name} was started again during the run (times: {restarts})")
     if as_json:
         print_json(summary)
     if verify and (reason := done.why_not_same(given)):

@@ -8,6 +8,7 @@ import click
 
 from hil.commands.wire_options import SECURE
 from hil.errors import UsageError
+from hil.log.report_json import note
 from hil.wire.endpoints import DEFAULT_ENDPOINT, SECURE_ENDPOINT
 
 _LONGEST_WAIT_S = 0.2
@@ -66,4 +67,4 @@ def command(secure: Path | None, listen: str | None, zenoh_config: Path | None, 
 
 
 def _say(line: str) -> None:
-    click.echo(f"abreast router: {line}", err=True)
+    note(f"abreast router: {line}")

@@ -18,8 +18,8 @@ from hil.commands.seconds import DURATION, Seconds
 from hil.errors import AbreastError, CheckFailedError, InterruptedRunError, UsageError
 from hil.judge.made_by import law_failure
 from hil.live.crew import Crew
-from hil.log.report_json import print_json, results_apart
-from hil.reports.judged_log import claimed, judge_log, made_folder
+from hil.log.report_json import note, print_json, results_apart, say
+from hil.reports.judged_log import claimed, judge_log, made_folder, results_in
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario, refuse_unrunnable
 from hil.scenario.guarded import with_guards
@@ -238,9 +238,7 @@ def _lockstep(scenario: Scenario, log_path: Path) -> dict[str, float]:
 
     timing = timed_lockstep(scenario, log_path)
     took, times = timing["wall_s"], timing["times_real_time"]
-    click.echo(
-        f"{scenario.run.duration_s:g} s in lockstep in {took:.2f} s ({times:.0f} times real time)", err=True
-    )
+    note(f"{scenario.run.duration_s:g} s in lockstep in {took:.2f} s ({times:.0f} times real time)")
     return timing
 
 
@@ -300,16 +298,14 @@ def _make_whole(log_path: Path, cut: Path) -> None:
         try:
             recover(log_path, whole)
         except AbreastError as error:
-            click.echo(f"the log was cut off and stays so: {error}", err=True)
+            note(f"the log was cut off and stays so: {error}")
             if isinstance(error, UsageError) and cut.suffix == ".cut":
                 # The other pieces are read without one of which nothing is left.
                 log_path.rename(cut)
             return
         log_path.rename(cut)
         whole.rename(log_path)
-        click.echo(
-            f"the log was cut off; {log_path} is what could be recovered, {cut} what there was", err=True
-        )
+        note(f"the log was cut off; {log_path} is what could be recovered, {cut} what there was")
 
 
 @collector_paused()
@@ -327,4 +323,5 @@ def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
         return judge_run(log, own, folder)
     summary = judge_log(log, folder)
     print_summary(summary)
+    say(results_in(folder))
     return summary

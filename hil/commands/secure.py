@@ -9,6 +9,7 @@ import click
 
 from hil.commands.guard_option import NO_GUARD
 from hil.errors import UsageError
+from hil.log.report_json import say
 
 
 @click.group("secure")
@@ -56,4 +57,4 @@ def init(
     wanted = Deployment(chosen, hosts, days)
     make_keys(folder, wanted, now=now, replacing=force)
     until = now + datetime.timedelta(days=days)
-    click.echo(f"{folder}: keys of {', '.join(ROLES)} for {chosen.name}, valid until {until:%Y-%m-%d}")
+    say(f"{folder}: keys of {', '.join(ROLES)} for {chosen.name}, valid until {until:%Y-%m-%d}")

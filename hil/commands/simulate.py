@@ -10,7 +10,7 @@ import click
 from hil.commands.outputs import OutputFolder
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION
-from hil.log.report_json import print_json, results_apart
+from hil.log.report_json import print_json, results_apart, say
 from hil.scenario.files import load_scenario
 
 
@@ -50,9 +50,9 @@ def command(
         print_json(result)
         return
     for key, value in result.items():
-        click.echo(f"{key}: {_formatted(value)}", err=True)
+        say(f"{key}: {_formatted(value)}")
     if out is not None:
-        click.echo(f"pictures and trajectory.csv are in {out}", err=True)
+        say(f"pictures and trajectory.csv are in {out}")
 
 
 def _formatted(value: Any) -> str:

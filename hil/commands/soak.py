@@ -12,7 +12,7 @@ from hil.commands.outputs import OutputFolder, new_folder
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
 from hil.live.interrupts import interrupt_on_signals
-from hil.log.report_json import print_json, print_text, results_apart, write_json
+from hil.log.report_json import note, print_json, print_text, results_apart, write_json
 from hil.log.rotating_log import log_place
 from hil.scenario.files import load_scenario, refuse_unrunnable
 
@@ -82,7 +82,7 @@ class _Progress:
     def say(self, at_s: float, held: str) -> None:
         if (now_s := time.monotonic()) - self._said_s >= _TOLD_EACH_S:
             self._said_s = now_s
-            click.echo(f"{at_s:5.0f} / {self._duration_s:.0f} s: {held}", err=True)
+            note(f"{at_s:5.0f} / {self._duration_s:.0f} s: {held}")
 
 
 def _lines(result: dict[str, Any]) -> list[str]:

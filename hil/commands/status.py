@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -12,6 +11,7 @@ import click
 
 from hil.commands.wire_options import endpoints_of, wire_options
 from hil.errors import CheckFailedError, UsageError
+from hil.log.report_json import print_with_nulls, result_console
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -42,7 +42,6 @@ def command(
     overrides: tuple[str, ...],
 ) -> None:
     """Show daemons, bodies, robots, ages and refusals of the lab of SCENARIO, live."""
-    from rich.console import Console
     from rich.live import Live
 
     from hil.live.lab_state import LabState, hear_for
@@ -62,15 +61,21 @@ def command(
         wire.subscribe(state.topics, shown=False)
         take = wire.inbox.take
         hear_for(state, take, clock, clock() + _FIRST_LOOK_S)
+        console = result_console()
+        # What cannot be drawn anew, as a file cannot, takes one look.
+        once = once or not console.is_terminal or console.is_dumb_terminal
         if as_json:
-            click.echo(json.dumps(state.as_dict(clock())))
+            print_with_nulls(state.as_dict(clock()))
         elif once:
-            Console().print(_table(state, clock()))
+            console.print(_table(state, clock()))
         if once or as_json:
             if unwell := state.unwell(wanted, clock()):
                 raise CheckFailedError("; ".join(unwell))
             return
-        with suppress(KeyboardInterrupt), Live(_table(state, clock()), auto_refresh=False) as shown:
+        with (
+            suppress(KeyboardInterrupt),
+            Live(_table(state, clock()), console=console, auto_refresh=False) as shown,
+        ):
             while True:
                 hear_for(state, take, clock, clock() + _REFRESH_S)
                 shown.update(_table(state, clock()), refresh=True)

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from hil.commands.wire_options import endpoints_of, wire_options
+from hil.log.report_json import note, say
 
 _REPEAT_S = 0.1
 _TIMES = 5
@@ -59,15 +60,12 @@ def command(
         while ((driven := state.driven(clock())) or state.unheard()) and clock() < until:
             hear_for(state, wire.inbox.take, clock, clock() + _LOOK_S)
     if driven:
-        click.echo(
-            f"abreast stop: somebody still drives {', '.join(driven)}; use the robot's switch", err=True
-        )
+        note(f"abreast stop: somebody still drives {', '.join(driven)}; use the robot's switch")
         sys.exit(1)
     if unheard := state.unheard():
-        click.echo(
+        note(
             f"abreast stop: nothing was heard of {', '.join(unheard)} on this wire; "
-            "give --scenario FILE of your lab, and see that its bridge runs",
-            err=True,
+            "give --scenario FILE of your lab, and see that its bridge runs"
         )
         sys.exit(1)
-    click.echo(f"abreast stop: {', '.join(state.robots.values())} told to stand ({reason})", err=True)
+    say(f"{', '.join(state.robots.values())} told to stand ({reason})")

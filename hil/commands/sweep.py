@@ -13,7 +13,8 @@ from hil.commands.outputs import OutputFolder, new_folder
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
-from hil.log.report_json import print_json, results_apart
+from hil.log.report_json import print_json, results_apart, say
+from hil.reports.judged_log import results_in
 from hil.sweep.spec import Sweep, load_sweep
 
 
@@ -79,9 +80,9 @@ def command(
     if "worst" in kept:
         to_keep += worst_runs(result)
     for cell, run in to_keep:
-        click.echo(f"kept {keep_run(sweep, folder, cell, run)}", err=True)
+        say(f"kept {keep_run(sweep, folder, cell, run)}")
     write_results(sweep, result, folder)
-    click.echo(f"results in {folder}, look at {folder / 'report.html'}", err=True)
+    say(results_in(folder))
     if as_json:
         print_json(result)
     if reason := law_failure(sweep, result):
@@ -115,11 +116,11 @@ def _fly(sweep: Sweep, folder: Path, workers: int, scheduler: str | None) -> dic
             scheduler=scheduler,
             progress=lambda done: bar.update(task, completed=done),
         )
-    _say(console, result)
+    _say(result)
     return result
 
 
-def _say(console: Any, result: dict[str, Any]) -> None:
+def _say(result: dict[str, Any]) -> None:
     from hil.judge.consistency import nees_finding
 
     cells = result["cells"]
@@ -129,8 +130,8 @@ def _say(console: Any, result: dict[str, Any]) -> None:
             violations[name] = violations.get(name, 0) + count
     samples, diverged = (sum(cell[name] for cell in cells) for name in ("samples", "diverged"))
     speed = result["run_seconds"] / result["wall_s"]
-    console.print(f"{len(cells)} cells, {samples} samples, {diverged} runs diverged")
-    console.print("outside their bounds: " + ", ".join(f"{name} {n}" for name, n in violations.items()))
+    say(f"{len(cells)} cells, {samples} samples, {diverged} runs diverged")
+    say("outside their bounds: " + ", ".join(f"{name} {n}" for name, n in violations.items()))
     if off := sum(bool(nees_finding(cell)) for cell in cells):
-        console.print(f"in {off} of {len(cells)} cells the deviations are not what the errors are (nees)")
-    console.print(f"{result['run_seconds']:.0f} s of runs in {result['wall_s']:.1f} s ({speed:.0f} to 1)")
+        say(f"in {off} of {len(cells)} cells the deviations are not what the errors are (nees)")
+    say(f"{result['run_seconds']:.0f} s of runs in {result['wall_s']:.1f} s ({speed:.0f} to 1)")

@@ -17,7 +17,7 @@ _PATIENCE_S = 20.0
 
 
 class Processes:
-    """Processes by name, in order of their start. What each says goes to ``NAME.err`` in a folder."""
+    """Processes by name, in order of their start. ``NAME.err`` in a folder takes what each prints."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -30,7 +30,7 @@ class Processes:
             process = subprocess.Popen(
                 [*before, sys.executable, *arguments],
                 stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE if name == "stranger" else subprocess.DEVNULL,
+                stdout=subprocess.PIPE if name == "stranger" else words,
                 stderr=words,
                 start_new_session=True,
             )

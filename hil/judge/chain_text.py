@@ -6,7 +6,6 @@ The last column is the latency from the capture of a frame to the command that r
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -17,13 +16,14 @@ from rich.text import Text
 from hil.judge.certified import certified_violations
 from hil.judge.made_by import made_by
 from hil.judge.summary_text import BAD, GOOD, PLAIN, extended_violations, parity_line, warnings_of
+from hil.log.report_json import result_console
 
 _COLUMNS = ("follower", "rho [m]", "settled", "v1 RMSE", "alpha1", "bounds", "p50, p99")
 
 
 def print_chain(summary: Mapping[str, Any], console: Console | None = None) -> None:
-    """Print the summary of a chain, ``parity`` included, to stderr or another console."""
-    console = console or Console(file=sys.stderr)
+    """Print the summary of a chain, ``parity`` included, where results are read or on another console."""
+    console = console or result_console()
     head = Table.grid(padding=(0, 2))
     for name, finding, style in _head_lines(summary):
         head.add_row(Text(name, style="bold"), Text(finding, style=style))

@@ -7,7 +7,6 @@ from dataclasses import replace
 from itertools import compress
 from typing import Any
 
-import click
 import numpy as np
 
 from hil import __version__
@@ -24,6 +23,7 @@ from hil.judge.run_data import (
 )
 from hil.log.metadata import IMPORT, cut_in_front_s, mode_of, version_of
 from hil.log.reader import Log
+from hil.log.report_json import note
 from hil.replay.kept import Array, KeptReplay
 from hil.replay.re_execution import Parity
 from hil.replay.rerun import Replay
@@ -141,7 +141,7 @@ def print_fed(log: Log, *played: Played) -> None:
     for each in played:
         if each.fed:
             whose = f" of {each.link.follower}" if each.link.in_chain else ""
-            click.echo(f"log {log.path}: its inputs{whose} are fed in log order: {each.fed}", err=True)
+            note(f"log {log.path}: its inputs{whose} are fed in log order: {each.fed}")
 
 
 def why_not_same(log: Log, played: Played) -> str:

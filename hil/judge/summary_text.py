@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -13,6 +12,7 @@ from rich.text import Text
 
 from hil.judge.made_by import law_failure, made_by
 from hil.judge.noise import noise_warnings
+from hil.log.report_json import result_console
 from hil.nodes.findings import finding_line
 
 GOOD, BAD, PLAIN = "green", "bold red", ""
@@ -32,8 +32,8 @@ OFF_SHARE = 0.25
 
 
 def print_summary(summary: Mapping[str, Any], console: Console | None = None) -> None:
-    """Print a summary, ``parity`` included, to stderr or another console."""
-    console = console or Console(file=sys.stderr)
+    """Print a summary, ``parity`` included, where results are read or on another console."""
+    console = console or result_console()
     table = Table.grid(padding=(0, 2))
     for name, finding, style in verdict_lines(summary):
         table.add_row(Text(name, style="bold"), Text(finding, style=style))

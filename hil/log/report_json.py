@@ -1,20 +1,32 @@
-"""Results as JSON: what cannot be known is absent, never made up."""
+"""Results: as JSON, where what cannot be known is absent, and where commands print them.
+
+Results go to stdout, progress and notes to stderr. Where one JSON object is asked for it is alone on stdout,
+and what a person reads of the same goes to stderr too.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import json
 import math
+import os
+import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO, cast
 
 import click
 import numpy as np
 
 from hil.log.written_aside import write_text_aside
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+_UNFOLDED = 400
+"""Columns where no terminal says how many it has: lines of a file are not folded."""
 
 
 def known(value: Any) -> Any:
@@ -68,6 +80,47 @@ def print_with_nulls(result: Mapping[str, Any]) -> None:
 def print_text(text: str) -> None:
     """Print a result that is text on stdout."""
     click.echo(text, file=_results.get(), nl=False)
+
+
+def say(line: str) -> None:
+    """Print a line of what a person reads of a result."""
+    click.echo(line, file=_readers())
+
+
+def note(line: str) -> None:
+    """Print a line of progress, or of what is worth to know on the way, on stderr."""
+    click.echo(line, err=True)
+
+
+def result_console() -> Console:
+    """What prints tables and colours of what a person reads of a result."""
+    from rich.console import Console
+
+    file = _readers()
+    if file.isatty() or "COLUMNS" in os.environ:
+        return Console(file=file, highlight=False)
+    return Console(file=cast(TextIO, _Unpadded(file)), width=_UNFOLDED, highlight=False)
+
+
+class _Unpadded:
+    """A file whose lines end where their words do: columns of a table are as wide as their longest cell."""
+
+    def __init__(self, file: TextIO) -> None:
+        self._file = file
+
+    def write(self, text: str) -> int:
+        return self._file.write(re.sub(r" +$", "", text, flags=re.MULTILINE))
+
+    def flush(self) -> None:
+        self._file.flush()
+
+
+def _readers() -> TextIO:
+    """Where people read results: stdout, or stderr where one JSON object is to be alone there."""
+    context = click.get_current_context(silent=True)
+    if context is not None and context.params.get("as_json"):
+        return sys.stderr
+    return _results.get() or sys.stdout
 
 
 def write_json(result: Mapping[str, Any], path: Path) -> None:

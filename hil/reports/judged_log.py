@@ -52,6 +52,12 @@ def judge_log(log: Log, folder: Path) -> dict[str, Any]:
     return summary
 
 
+def results_in(folder: Path) -> str:
+    """Where results are, and what to look at first, in words."""
+    report = folder / "report.html"
+    return f"results in {folder}" + (f", look at {report}" if report.exists() else "")
+
+
 def leave(run_data: RunData, summary: Mapping[str, Any], folder: Path, picture: str) -> None:
     """Write the summary of a run's data, its picture by the given name, and its report."""
     # All that drawing needs: a second of imports, for those who ask only.

@@ -147,7 +147,7 @@ def test_the_path_leads_to_a_formation(peers: Path, tmp_path: Path, monkeypatch:
             with peer("hand", [str(HERE / "rclpy_teleop.py"), json.dumps(told)], peers):
                 done(recorder)
             robots.finish()
-        put_in(scenario, done(path.take("calibrate")).stderr)
+        put_in(scenario, done(path.take("calibrate")).stdout)
         found = load_scenario(str(scenario))
         assert found.follower.mount == pytest.approx(FOLLOWER_MOUNT, abs=0.004)
         assert found.leader.mount == pytest.approx(LEADER_MOUNT, abs=0.004)

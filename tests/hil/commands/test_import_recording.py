@@ -41,6 +41,7 @@ def pair_of_robots(*, gaps: bool = False) -> Tracks:
 
 class Said(NamedTuple):
     code: int
+    out: str
     err: str
 
 
@@ -58,9 +59,8 @@ def abreast(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pyt
         with pytest.raises(SystemExit) as left:
             main(["import", *(str(argument) for argument in arguments)])
         caught = capsys.readouterr()
-        assert caught.out == ""
         assert isinstance(left.value.code, int)
-        return Said(left.value.code, caught.err)
+        return Said(left.value.code, caught.out, caught.err)
 
     return call
 
@@ -126,8 +126,8 @@ def test_a_recording_goes_through_in_one_command(
         (tmp_path / "take.csv").write_bytes(text)
         said = abreast("csv", "take.csv")
     assert said.code == 0
-    assert "120 Hz" in said.err
-    assert "take.mcap: 720 rows from 0 s to 5.99167 s; go on with: abreast replay take.mcap" in said.err
+    assert "120 Hz" in said.out
+    assert "take.mcap: 720 rows from 0 s to 5.99167 s; go on with: abreast replay take.mcap" in said.out
     found = errors(tmp_path / "take.mcap", driven)
     assert found[0] < 0.0015
     assert found[1] < 0.03
@@ -142,8 +142,8 @@ def test_gaps_are_counted_and_are_no_damage(abreast: Abreast, tmp_path: Path) ->
     written(tmp_path, motive_text(Motive(), pair_of_robots(gaps=True)))
     said = abreast("csv", "take.csv")
     assert said.code == 0
-    assert f"take.csv: leader missing in 3 of {ROWS} rows" in said.err
-    assert f"take.csv: follower missing in 1 of {ROWS} rows" in said.err
+    assert f"take.csv: leader missing in 3 of {ROWS} rows" in said.out
+    assert f"take.csv: follower missing in 1 of {ROWS} rows" in said.out
 
 
 def test_bodies_are_named_where_there_are_more_than_two(abreast: Abreast, tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_bodies_are_named_where_there_are_more_than_two(abreast: Abreast, tmp_pa
     assert "'A' cannot be both leader and follower" in said.err
     said = abreast("csv", "take.csv", "--leader", "B", "--follower", "A")
     assert said.code == 0
-    assert "leader 'B', follower 'A' of 4 bodies" in said.err
+    assert "leader 'B', follower 'A' of 4 bodies" in said.out
     source = read_log(tmp_path / "take.mcap").metadata["source"]
     assert (source["leader"], source["follower"]) == ("B", "A")
     assert source["capture start time"] == "2026-01-05 03.49.50.755 PM"
@@ -169,9 +169,9 @@ def test_bodies_are_named_where_there_are_more_than_two(abreast: Abreast, tmp_pa
 
 def test_one_of_two_bodies_names_the_other(abreast: Abreast, tmp_path: Path) -> None:
     written(tmp_path, motive_text(Motive(names=("A", "B")), pair_of_robots()))
-    assert "leader 'A', follower 'B'" in abreast("csv", "take.csv", "--out", "1.mcap").err
-    assert "leader 'B', follower 'A'" in abreast("csv", "take.csv", "--leader", "B", "--out", "2.mcap").err
-    assert "leader 'B', follower 'A'" in abreast("csv", "take.csv", "--follower", "A", "--out", "3.mcap").err
+    assert "leader 'A', follower 'B'" in abreast("csv", "take.csv", "--out", "1.mcap").out
+    assert "leader 'B', follower 'A'" in abreast("csv", "take.csv", "--leader", "B", "--out", "2.mcap").out
+    assert "leader 'B', follower 'A'" in abreast("csv", "take.csv", "--follower", "A", "--out", "3.mcap").out
 
 
 @pytest.mark.parametrize("kind", ["motive", "qtm", "table"])
@@ -187,7 +187,7 @@ def test_a_torn_end_is_said_and_the_rest_is_written(kind: str, abreast: Abreast,
     said = abreast("csv", "take.csv")
     assert said.code == 1
     assert f"line {lines} is cut off; left out of take.mcap, which is written" in said.err
-    assert f"{ROWS - 1} rows" in said.err
+    assert f"{ROWS - 1} rows" in said.out
     assert read_log(tmp_path / "take.mcap").topics
 
 

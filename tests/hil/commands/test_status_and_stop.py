@@ -69,7 +69,7 @@ def test_a_stop_reaches_everybody_with_its_reason(lab: tuple[str, Wire]) -> None
     with again(wire, *ROBOTS):
         done = ran("stop", "enough of it", "--connect", endpoint)
     assert done.returncode == 0, done.stderr
-    assert "leader, follower told to stand (enough of it)" in done.stderr
+    assert "leader, follower told to stand (enough of it)" in done.stdout
     heard: dict[str, bytes] = {}
     while (event := wire.inbox.take(0.2)) is not None:
         heard[event.topic] = event.payload

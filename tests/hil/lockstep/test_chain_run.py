@@ -50,7 +50,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     options = [word for each in GIVEN for word in ("--set", each)]
     result = abreast("run", "chain5-turtlebot3", "--lockstep", "--certify", "--out", str(out), *options)
     assert result.code == 0, result.stderr
-    assert "all at their station" in result.stderr
+    assert "all at their station" in result.stdout
     return out
 
 

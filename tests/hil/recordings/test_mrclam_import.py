@@ -122,7 +122,7 @@ def test_the_command_imports_and_says_how_to_go_on(
     with pytest.raises(SystemExit) as done:
         main([*arguments, str(tmp_path / "pair.mcap")])
     assert done.value.code == 0
-    assert "abreast replay" in capsys.readouterr().err
+    assert "abreast replay" in capsys.readouterr().out
     with pytest.raises(SystemExit) as refused:
         main([*arguments, str(tmp_path / "pair.mcap")])
     assert refused.value.code == 2

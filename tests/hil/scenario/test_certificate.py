@@ -45,8 +45,8 @@ def test_json_has_the_keys_of_the_contract_and_what_each_rests_on(capsys: pytest
 
 def test_people_read_what_is_guaranteed_and_what_is_not(capsys: pytest.CaptureFixture[str]) -> None:
     out, err = printed(capsys, "turtlebot3", "--set", "leader.k_u=1.7")
-    text = " ".join(err.split())
-    assert not out
+    text = " ".join(out.split())
+    assert not err
     assert "nothing is guaranteed: a constant turn of 1.7 rad/s" in text
     assert "assuming [1] noise: positions within 5 sigma = 1.5 mm (motion capture)" in text
 

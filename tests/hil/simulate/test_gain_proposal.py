@@ -28,7 +28,7 @@ def test_the_command_prints_a_proposal(capsys: pytest.CaptureFixture[str]) -> No
     with pytest.raises(SystemExit) as left:
         main(["gains", "turtlebot3", "--set", "mocap.latency_s=3"])
     assert left.value.code == 0
-    text = capsys.readouterr().err
+    text = capsys.readouterr().out
     assert text.startswith("no gains work: mu1 needs")
     assert "mu_rho: at least" in text
 
