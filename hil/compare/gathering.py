@@ -19,14 +19,13 @@ from hil.log.description import RECORD
 from hil.log.log_folder import logs_in
 from hil.log.opened import opened_log
 from hil.log.reader import Log
-from hil.reports.sweep_cells import is_known
+from hil.reports.sweep_cells import is_known, point_of
 from hil.sweep.results import flat
 
 _EXPECTED = (
     "expected the folder of a run (summary.json), of a sweep or of judged logs (results.json), of many "
     "of these, or a log"
 )
-_POINT = ("sigma_position", "sigma_heading", "latency_s", "loss", "parameters")
 
 
 def groups_of(paths: Sequence[Path]) -> list[Group]:
@@ -116,8 +115,7 @@ def _of_results(path: Path, file: Path, label: str) -> Group:
 
 def _cell(number: int, cell: Mapping[str, Any], facts: Mapping[str, str], alone: bool) -> Sample:
     """A cell; of a single estimator it is the same whichever that is."""
-    point = {name: cell[name] for name in _POINT if name in cell}
-    key = json.dumps(point if alone else {**point, "estimator": cell["estimator"]}, sort_keys=True)
+    key = point_of(cell) if alone else f"{cell['estimator']} at {point_of(cell)}"
     metrics = metrics_of(cell) if is_known(cell) else {"diverged": float(cell["diverged"])}
     return Sample(f"cell {number}", key, metrics, facts)
 

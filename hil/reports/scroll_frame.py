@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 SCROLL_STYLE = """<style>
 .scrolls { position: relative; } .scrolls > .wide { border: 1px solid var(--line); border-radius: .3rem;
   padding: .3rem .6rem; scrollbar-width: thin;
@@ -17,12 +19,20 @@ SCROLL_STYLE = """<style>
 """
 
 
-_PLAIN, _FRAME = '<div class="wide">', '<div class="wide" tabindex="0" role="region" aria-label="table">'
+_PLAIN = '<div class="wide">'
+_CAPTION = re.compile(r"<caption>(.*?)</caption>", re.DOTALL)
 
 
 def framed(table: str) -> str:
     """A table of :func:`hil.reports.page.table_html` in a frame with shadows where there is more to see.
 
-    It can be scrolled by keyboard.
+    It can be scrolled by keyboard. Its caption stands above the frame, where it is not cut off.
     """
-    return f'<div class="scrolls">{table.replace(_PLAIN, _FRAME, 1)}</div>' if table else ""
+    if not table:
+        return ""
+    found = _CAPTION.search(table)
+    caption = found[1] if found else "table"
+    bare = _CAPTION.sub("", table, count=1)
+    inner = bare.replace(_PLAIN, f'<div class="wide" tabindex="0" role="region" aria-label="{caption}">', 1)
+    above = f'<p class="soft">{caption}</p>' if found else ""
+    return f'<div class="scrolls">{above}{inner}</div>'

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 Cell = Mapping[str, Any]
+
+_POINT = ("sigma_position", "sigma_heading", "latency_s", "loss", "parameters")
 
 FOILS = ("difference", "shape-ekf")
 """Estimators to compare others with: the paper's literal way, and a filter that knows no speed of zero."""
@@ -20,6 +23,11 @@ def is_known(cell: Cell) -> bool:
 def is_sound(cell: Cell) -> bool:
     """Whether a cell's figures are those of all its runs: none of them diverged."""
     return is_known(cell) and not int(cell["diverged"])
+
+
+def point_of(cell: Cell) -> str:
+    """Where a cell is in the grid, whatever its estimator, as text that tells it from all others."""
+    return json.dumps({name: cell[name] for name in _POINT if name in cell}, sort_keys=True)
 
 
 def estimators_of(cells: Sequence[Cell]) -> tuple[list[str], list[str]]:
