@@ -19,6 +19,7 @@ COMMANDS = {
     "simulate": "the noise-free experiments of the paper, with pictures",
     "bounds": "the certificate: what is guaranteed of estimates and formation, and on what it rests",
     "sweep": "Monte Carlo over noise against the bounds, on this machine or a cluster",
+    "compare": "runs, logs or sweeps beside each other: what differs, and which was better",
     "gains": "propose gains for a scenario, with the reason for each",
     "import": "turn other recordings into logs",
     "calibrate": "find the offsets of a range and bearing sensor that mocap has watched",

@@ -122,16 +122,12 @@ def _fly(sweep: Sweep, folder: Path, workers: int, scheduler: str | None) -> dic
 
 def _say(result: dict[str, Any]) -> None:
     from hil.judge.consistency import nees_finding
+    from hil.reports.sweep_verdict import sweep_verdict
 
     cells = result["cells"]
-    violations: dict[str, int] = {}
-    for cell in cells:
-        for name, count in cell["bounds"]["violations"].items():
-            violations[name] = violations.get(name, 0) + count
-    samples, diverged = (sum(cell[name] for cell in cells) for name in ("samples", "diverged"))
     speed = result["run_seconds"] / result["wall_s"]
-    say(f"{len(cells)} cells, {samples} samples, {diverged} runs diverged")
-    say("outside their bounds: " + ", ".join(f"{name} {n}" for name, n in violations.items()))
+    for line in sweep_verdict(cells).lines():
+        say(line)
     if off := sum(bool(nees_finding(cell)) for cell in cells):
         say(f"in {off} of {len(cells)} cells the deviations are not what the errors are (nees)")
     say(f"{result['run_seconds']:.0f} s of runs in {result['wall_s']:.1f} s ({speed:.0f} to 1)")

@@ -30,7 +30,7 @@ def bag_folder(path: Path) -> BagFolder:
 
     Raises :class:`UsageError` for a folder without a bag, and for one that lacks a file that it names.
     """
-    there = sorted((each for each in path.iterdir() if each.name.endswith(SUFFIXES)), key=_in_order)
+    there = sorted((each for each in path.iterdir() if each.name.endswith(SUFFIXES)), key=in_order)
     told = _told(path / METADATA)
     named = told.get("relative_file_paths") or []
     parts = [_there(path, name) for name in named] if isinstance(named, list) else []
@@ -78,7 +78,7 @@ def _is_packed(path: Path, parts: list[Path]) -> bool:
     )
 
 
-def _in_order(path: Path) -> list[tuple[bool, int, str]]:
+def in_order(path: Path) -> list[tuple[bool, int, str]]:
     """Sort key by which ``bag_10`` comes after ``bag_9``."""
     pieces = re.split(r"(\d+)", path.name)
     return [(piece.isdecimal(), int(piece) if piece.isdecimal() else 0, piece) for piece in pieces]

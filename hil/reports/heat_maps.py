@@ -6,37 +6,34 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import Any
 
 import numpy as np
-from bokeh.palettes import Cividis256
 
-from hil.reports.colours import DARK
+from hil.reports.cell_looks import ABSENT, LOOKS, Look, coloured, unjudged
+from hil.reports.cell_table import address_of
 from hil.reports.plot_models import Field, Model, Value, source_of
 from hil.reports.plots import Panel, blank, hover
 from hil.reports.run_tables import QUANTITIES, scale_of
+from hil.reports.sweep_cells import Cell, estimators_of, is_sound, number
 
-Cell = Mapping[str, Any]
-
-_NOTHING = ("#ffffff", DARK, "")
 _HEIGHT_OF_ROW, _HEIGHT_OF_LABEL, _HEIGHT_OF_REST = 38, 130, 64
-_BRIGHT = 0.18
-"""Relative luminance above which black letters stand out more than white ones."""
-
 # What is shown when another quantity or slice is chosen lies in the page already, by its key.
-SWITCH = """
+SWITCH = (
+    f"""
+const looks = {list(LOOKS)};
+"""
+    + """
 const chosen = () => ["quantity", "slice"].map(id => document.getElementById(id).value).join("|");
 const show = () => {
   for (const plot of Bokeh.documents[0].roots()) for (const renderer of plot.renderers) {
-    const data = renderer.data_source.data;
-    const key = chosen();
-    renderer.data_source.data = {
-      ...data, fill: data["fill|" + key], ink: data["ink|" + key], text: data["text|" + key],
-      tip: data["tip|" + key]};
+    const data = renderer.data_source.data, key = chosen();
+    const shown = Object.fromEntries(looks.map(name => [name, data[name + "|" + key]]));
+    renderer.data_source.data = {...data, ...shown};
   }
 };
 for (const id of ["quantity", "slice"]) document.getElementById(id).addEventListener("change", show);
 """
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,16 +47,16 @@ class Merit:
 
 
 def _rmse(cell: Cell, quantity: str) -> float | None:
-    return _known(cell.get("rmse", {}).get(quantity))
+    return number(cell.get("rmse", {}).get(quantity))
 
 
 def _efficiency(cell: Cell, quantity: str) -> float | None:
-    return _known(cell.get("efficiency", {}).get(quantity))
+    return number(cell.get("efficiency", {}).get(quantity))
 
 
 def tightness(cell: Cell, quantity: str) -> float | None:
     """Largest error of a quantity over its extended bound, None where that is not known."""
-    return _known(cell.get("bounds", {}).get("tightness", {}).get(f"{quantity}_extended"))
+    return number(cell.get("bounds", {}).get("tightness", {}).get(f"{quantity}_extended"))
 
 
 MERITS = (
@@ -121,42 +118,50 @@ def slice_name(where: Slice) -> str:
 
 
 def heat_maps(cells: Sequence[Cell], merit: Merit) -> list[Panel]:
-    """One map for every estimator, all of one colour scale, that of a quantity through all slices."""
-    positions = sorted({float(cell["sigma_position"]) for cell in cells})
-    headings = sorted({float(cell["sigma_heading"]) for cell in cells})
-    rows, columns = [f"{1e3 * each:g}" for each in positions], [_degrees(each) for each in headings]
-    places = {
-        (position, heading): n
-        for n, (position, heading) in enumerate((p, h) for p in positions for h in headings)
-    }
-    held = {
-        "row": [row for row in rows for _ in columns],
-        "column": [column for _ in rows for column in columns],
-    }
+    """One map for every estimator, all of one colour scale, that of a quantity through all slices.
+
+    Colours are of cells none of whose runs diverged; the others are marked as what they are. The scale is
+    that of the estimators asked about.
+    """
+    rows = _labels(cells, "sigma_position", lambda each: f"{1e3 * each:g}")
+    columns = _labels(cells, "sigma_heading", _degrees)
+    asked, foils = estimators_of(cells)
+    sound = [cell for cell in cells if is_sound(cell) and str(cell["estimator"]) in asked]
     panels = []
-    for estimator in dict.fromkeys(str(cell["estimator"]) for cell in cells):
-        data: dict[str, list[str]] = dict(held)
+    for estimator in (*asked, *foils):
+        data: dict[str, list[str]] = {
+            "row": [row for row in rows.values() for _ in columns],
+            "column": [column for _ in rows for column in columns.values()],
+        }
+        own = [(n, cell) for n, cell in enumerate(cells) if str(cell["estimator"]) == estimator]
         for quantity in quantities_of(cells):
-            scale = _scale([merit.value(cell, quantity) for cell in cells])
+            scale = _scale([merit.value(cell, quantity) for cell in sound])
             for n, each in enumerate(slices_of(cells)):
-                looks = [(*_NOTHING, "no such cell")] * len(places)
-                for number, cell in enumerate(cells):
-                    if str(cell["estimator"]) == estimator and slice_of(cell) == each:
-                        place = places[float(cell["sigma_position"]), float(cell["sigma_heading"])]
-                        looks[place] = _look(cell, number, quantity, merit, scale)
-                for name, values in zip(
-                    ("fill", "ink", "text", "tip"), zip(*looks, strict=True), strict=True
-                ):
-                    data[f"{name}|{quantity}|{n}"] = list(values)
-        first = f"{quantities_of(cells)[0]}|0"
-        data |= {name: data[f"{name}|{first}"] for name in ("fill", "ink", "text", "tip")}
-        panels.append(_map(estimator, data, rows, columns, merit))
+                looks = {
+                    (cell["sigma_position"], cell["sigma_heading"]): _look(cell, k, quantity, merit, scale)
+                    for k, cell in own
+                    if slice_of(cell) == each
+                }
+                shown = [looks.get((row, column), ABSENT) for row in rows for column in columns]
+                data |= {f"{name}|{quantity}|{n}": [getattr(look, name) for look in shown] for name in LOOKS}
+        first = f"{quantities_of(cells)[0]}|0" if quantities_of(cells) else ""
+        if first:
+            data |= {name: data[f"{name}|{first}"] for name in LOOKS}
+            says = f"{merit.title} of {estimator} over position and heading noise."
+            title = f"{estimator} (foil)" if estimator in foils else estimator
+            panels.append(noise_map(title, says, data, list(rows.values()), list(columns.values())))
     return panels
 
 
-def _map(
-    estimator: str, data: Mapping[str, list[str]], rows: Sequence[str], columns: Sequence[str], merit: Merit
+def _labels(cells: Sequence[Cell], axis: str, tell: Callable[[float], str]) -> dict[float, str]:
+    """Values of an axis in order, with what they are called."""
+    return {value: tell(value) for value in sorted({float(cell[axis]) for cell in cells})}
+
+
+def noise_map(
+    title: str, says: str, data: Mapping[str, list[str]], rows: Sequence[str], columns: Sequence[str]
 ) -> Panel:
+    """A map of :class:`~hil.reports.cell_looks.Look` as columns of ``data``; a cell leads to its ``href``."""
     plot = blank(
         height=_HEIGHT_OF_REST + max(_HEIGHT_OF_ROW * len(rows), _HEIGHT_OF_LABEL),
         x_label="heading noise [deg]",
@@ -168,43 +173,39 @@ def _map(
     for grid in plot.grids:
         grid.set(grid_line_color=None)
     source, place = source_of(data), {"x": Field("column"), "y": Field("row")}
-    size = {"width": Value(0.96), "height": Value(0.92)}
-    area = Model("Rect", **place, **size, fill_color=Field("fill"), line_color=Value(None))
-    hover(plot, plot.add_glyph(source, area), {estimator: "@tip"}, mode="mouse")
+    area = Model(
+        "Rect",
+        **place,
+        width=Value(0.96),
+        height=Value(0.92),
+        fill_color=Field("fill"),
+        line_color=Value(None),
+        hatch_pattern=Field("hatch"),
+        hatch_color=Value("#000000"),
+        hatch_alpha=Value(0.2),
+        hatch_scale=Value(9.0),
+        hatch_weight=Value(1.0),
+    )
+    drawn = plot.add_glyph(source, area)
+    hover(plot, drawn, {title: "@tip"}, mode="mouse")
+    there = Model("OpenURL", url="@href", same_tab=True)
+    plot.add_tools(Model("TapTool", renderers=[drawn], behavior="inspect", callback=there))
     centred = {"text_align": Value("center"), "text_baseline": Value("middle")}
-    font = {"text_color": Field("ink"), "text_font_size": Value("12px")}
+    font = {"text_color": Field("ink"), "text_font_size": Value("12px"), "text_font_style": Value("bold")}
     plot.add_glyph(source, Model("Text", **place, text=Field("text"), **centred, **font))
-    says = f"{merit.title} of {estimator} over position and heading noise."
-    return Panel(estimator, says, (), plot)
+    return Panel(title, says, (), plot)
 
 
-def _look(
-    cell: Cell, number: int, quantity: str, merit: Merit, scale: tuple[float, float]
-) -> tuple[str, str, str, str]:
-    """Colour, colour of the letters, letters, and what is told under the pointer."""
+def _look(cell: Cell, place: int, quantity: str, merit: Merit, scale: tuple[float, float]) -> Look:
     value = merit.value(cell, quantity)
-    tooltip = f"cell {number}, {cell['runs']} runs, {cell['diverged']} diverged"
-    if value is None:
-        return "#eeeeee", DARK, "–", f"not known; {tooltip}"
+    href = address_of(cell, place)
+    tip = f"cell {place}, {cell['runs']} runs, {cell['diverged']} diverged"
+    if not is_sound(cell) or value is None:
+        known = f"{merit.text(value, quantity)} where it did not; " if value and int(cell["samples"]) else ""
+        return unjudged(cell, known + tip, href)
     low, high = scale
     share = (math.log(value) - low) / (high - low) if value > 0.0 and high > low else 0.0
-    # Yellow is the good end, dark blue the bad one.
-    colour = Cividis256[255 - round(255 * min(max(share, 0.0), 1.0))]
-    return (
-        colour,
-        "#000000" if _luminance(colour) > _BRIGHT else "#ffffff",
-        merit.text(value, quantity),
-        tooltip,
-    )
-
-
-def _luminance(colour: str) -> float:
-    """Relative luminance of a colour such as ``#1a2b3c``, by WCAG 2."""
-    parts = [int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5)]
-    red, green, blue = (
-        part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts
-    )
-    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+    return coloured(share, merit.text(value, quantity), tip, href)
 
 
 def _scale(values: Sequence[float | None]) -> tuple[float, float]:
@@ -213,10 +214,6 @@ def _scale(values: Sequence[float | None]) -> tuple[float, float]:
     if not len(positive):
         return 0.0, 0.0
     return math.log(float(positive.min())), math.log(float(positive.max()))
-
-
-def _known(value: object) -> float | None:
-    return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
 
 
 def _degrees(angle: float) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hil import __version__
 from hil.log.report_json import write_json
 from hil.log.written_aside import write_text_aside, written_aside
 from hil.sweep.cell_report import report_cell
@@ -62,7 +63,8 @@ def write_results(sweep: Sweep, result: dict[str, Any], folder: Path) -> None:
     for cell, kept in zip(result["cells"], kept_runs(sweep, folder), strict=True):
         if kept:
             cell["kept"] = kept
-    write_json({"spec": spec_json(sweep.spec), **result}, folder / "results.json")
+    told = {"version": __version__, "spec": spec_json(sweep.spec), **result}
+    write_json(told, folder / "results.json")
     write_text_aside(folder / "report.html", sweep_report(result))
 
 

@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from bokeh.palettes import Cividis256
 from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
+from hil.reports.heat_maps import MERITS, Merit, heat_maps
 from hil.reports.sweep_report import sweep_report
 from tests.hil.reports.open_page import open_page
 
@@ -89,21 +91,89 @@ def test_a_sweep_opens_without_a_network_and_shows_what_is_chosen(
     other = cell("ukf", POSITIONS[1], HEADINGS[1], LATENCIES[2], LOSSES[1])
     assert letters(browser, 1)[at] == f"{math.degrees(other['rmse']['alpha1']):.3g}"
     assert letters(browser, 3)[at] == "1.00"
-    assert letters(browser, 8)[at] == "34%"
+    assert letters(browser, 8)[at] == "1 ✕", "a run of it diverged"
+    assert letters(browser, 7)[at] == "34%"
 
 
-def test_the_head_counts_violations_and_divergences(results: dict[str, Any]) -> None:
+def test_the_head_is_about_the_estimators_asked_about_and_names_foils(results: dict[str, Any]) -> None:
     said = words(sweep_report(results))
-    assert "Bounds violated: extended ones 0, sound ones 252 times. 18 runs diverged." in said
+    assert "ekf and ukf: no extended bound violated in 12960000 samples; none of 7200 runs diverged." in said
+    assert (
+        "difference (a foil): 18 of 3600 runs diverged, in 18 of 36 cells; outside bounds in 252 of" in said
+    )
     assert "108 cells, 10800 runs, 19440000 samples" in said
     assert "3.8 days of driving" in said
-    good = results | {"cells": [each for each in results["cells"] if each["estimator"] == "ekf"]}
-    assert "No sound or extended bound violated in 6480000 samples." in words(sweep_report(good))
+    foil = results | {"cells": [each for each in results["cells"] if each["estimator"] == "difference"]}
+    said = words(sweep_report(foil))
+    assert "difference: no extended bound violated in 6480000 samples; 18 of 3600 runs diverged" in said
+    assert "foil" not in said, "who asks for a foil alone asks about it"
+
+
+def test_a_violated_extended_bound_is_bad(results: dict[str, Any]) -> None:
+    assert 'class="verdict bad"' not in sweep_report(results)
+    results["cells"][0]["bounds"]["violations"]["h_extended"] = 3
+    page = sweep_report(results)
+    assert "extended bounds violated in 3 of 12960000 samples" in words(page)
+    assert 'class="verdict bad"' in page
+
+
+def fills(merit: Merit, cells: list[dict[str, Any]], estimator: int) -> dict[str, tuple[str, str]]:
+    """Colours of an estimator's map and what stands on them, by what is told under the pointer."""
+    source = heat_maps(cells, merit)[estimator].plot.attributes["renderers"][0].attributes["data_source"]
+    data = source.attributes["data"]
+    return {
+        tip: (fill, text)
+        for tip, fill, text in zip(data["tip|v1|0"], data["fill|v1|0"], data["text|v1|0"], strict=True)
+    }
+
+
+@pytest.mark.parametrize("merit", MERITS, ids=lambda merit: merit.title)
+def test_what_diverged_or_is_empty_is_never_coloured_as_good(results: dict[str, Any], merit: Merit) -> None:
+    cells = [each for each in results["cells"] if each["latency_s"] == each["loss"] == 0.0]
+    best = {"rmse": {"v1": 0.0}, "efficiency": {"v1": 0.0}}
+    lost = {"samples": 0, "bounds": {"tightness": {"v1_extended": 0.0}, "violations": {}}}
+    cells[0] |= best | lost | {"diverged": 100}
+    cells[1] |= best | lost
+    cells[2] |= {"diverged": 7}
+    shown = [*fills(merit, cells, 0).values(), *fills(merit, cells, 1).values()]
+    sound = {fill for fill, text in shown if "✕" not in text and text != "none"}
+    marked = {tip.partition(";")[0]: look for tip, look in fills(merit, cells, 0).items()}
+    assert marked["all diverged"][1] == "all ✕"
+    assert marked["no estimate tracked"][1] == "none"
+    assert marked["diverged"][1] == "7 ✕"
+    for name in ("all diverged", "no estimate tracked", "diverged"):
+        fill = marked[name][0]
+        assert fill not in sound
+        assert fill[1:3] == fill[3:5] == fill[5:7], "grey, which no good cell is"
+    assert Cividis256[255] in sound, "the scale begins with the best that was judged"
+
+
+def test_medians_are_over_the_same_cells_for_all_estimators(results: dict[str, Any]) -> None:
+    """One that gives up where it is hard must not look good for what is left."""
+    for each in results["cells"]:
+        if each["estimator"] == "ukf" and each["loss"] > 0.1:
+            each |= {"samples": 0, "diverged": 100}
+        if each["estimator"] == "ekf":
+            each["efficiency"] = {"v1": 3.0 if each["loss"] > 0.1 else 1.0}
+    said = words(sweep_report(results))
+    assert "ekf 3600 0 18 of 36 1.00" in said
+    assert "ukf 3600 1800 18 of 36" in said
+
+
+def test_a_cell_leads_to_its_kept_run_else_to_its_row(results: dict[str, Any]) -> None:
+    cells = results["cells"]
+    cells[0]["kept"] = {"3": "cell-0-run-3"}
+    page = sweep_report(results)
+    assert page.count('id="cell-1"') == 1
+    source = heat_maps(cells, MERITS[0])[0].plot.attributes["renderers"][0].attributes["data_source"]
+    leads = source.attributes["data"]["href|v1|0"]
+    assert leads[0] == "./cell-0-run-3/report.html"
+    assert all(lead.startswith("#cell-") for lead in leads[1:])
 
 
 def test_the_worst_runs_are_linked_where_they_were_kept(results: dict[str, Any]) -> None:
     cells = results["cells"]
-    hardest = max(range(len(cells)), key=lambda n: (cells[n]["diverged"], n))
+    hardest = max(n for n, each in enumerate(cells) if each["estimator"] == "ekf")
     cells[hardest]["bounds"]["tightness"]["h_extended"] = 0.99
     cells[hardest]["worst_run"] = 17
     assert f"--keep {hardest}:17" in words(sweep_report(results))
@@ -120,7 +190,7 @@ def test_what_cells_do_not_know_is_left_out(results: dict[str, Any]) -> None:
         each["bounds"] = {}
     said = words(sweep_report(results))
     assert not re.search(r"\b(nan|None|inf)\b", said)
-    assert "difference 3600 18 – – – – – 0 0 0 0" in said
+    assert "difference (foil) 3600 18 36 of 36 – – – – – 0 0 0 0" in said
 
 
 def test_cells_whose_deviations_are_not_what_errors_are_are_counted(results: dict[str, Any]) -> None:

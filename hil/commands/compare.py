@@ -1,0 +1,51 @@
+"""``abreast compare``: runs, logs or sweeps beside each other, and which was better."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from hil.commands.outputs import OutputFolder
+from hil.errors import CheckFailedError, UsageError
+from hil.log.report_json import print_json, print_text, results_apart
+
+
+@click.command("compare")
+@click.argument("paths", nargs=-1, required=True, metavar="A B ...", type=click.Path(path_type=Path))
+@click.option(
+    "--fail-if",
+    "conditions",
+    multiple=True,
+    metavar="EXPR",
+    help='Exit 1 if this holds of any but A, like "estimation.rmse.v1 > 1.1": the ratio to A\'s.',
+)
+@click.option("--out", type=OutputFolder(), metavar="DIR", help="Folder for compare.html and compare.json.")
+@click.option("--json", "as_json", is_flag=True, help="Print the comparison as one JSON object on stdout.")
+@results_apart()
+def command(paths: tuple[Path, ...], conditions: tuple[str, ...], out: Path | None, as_json: bool) -> None:
+    """Compare what B and others did with what A did: conditions, metrics with their spread, courses.
+
+    Each is the folder of a run, of many runs, of a sweep or of judged logs, or a log. --fail-if takes NAME,
+    ratio(NAME), change(NAME) or value(NAME) of a metric, a sign and a number; see docs/compare.md.
+    """
+    if len(paths) < 2:
+        raise UsageError(f"{paths[0]}: nothing to compare it with; give two or more")
+    from hil.compare.comparison import compared
+    from hil.compare.comparison_text import comparison_text
+    from hil.compare.conditions import failures_of, parsed_condition
+    from hil.compare.gathering import groups_of
+
+    parsed = [parsed_condition(text) for text in conditions]
+    groups = groups_of(paths)
+    comparison = compared(groups, failures_of(parsed, groups))
+    if out is not None:
+        from hil.compare.compare_page import leave_comparison
+
+        click.echo(f"look at {leave_comparison(comparison, out)}", err=True)
+    if as_json:
+        print_json(comparison.as_json())
+    else:
+        print_text(comparison_text(comparison))
+    if comparison.failures:
+        raise CheckFailedError("; ".join(failure.text for failure in comparison.failures))

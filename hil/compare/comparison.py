@@ -1,0 +1,116 @@
+"""Groups compared: what differs in their conditions and their metrics, as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from hil.compare.change import Change, change_of
+from hil.compare.conditions import Failure
+from hil.compare.group import RUNS, Group, Spread
+from hil.compare.metrics import goal_of, in_order
+from hil.compare.verdict import Verdict, verdict_on
+
+_MOST_VALUES = 5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """Groups, how their conditions differ (values of each group by key), and which was better."""
+
+    groups: tuple[Group, ...]
+    differences: dict[str, tuple[tuple[str, ...], ...]]
+    verdict: Verdict
+    notes: tuple[str, ...]
+    failures: tuple[Failure, ...]
+
+    def metrics(self) -> list[str]:
+        """Names of all metrics, those that are told first in front."""
+        return in_order(set[str]().union(*(group.metrics for group in self.groups)))
+
+    def spread(self, name: str, group: Group) -> Spread | None:
+        """Spread of a metric in a group, None where it is not known there."""
+        values = group.values(name)
+        return Spread.of(values) if values else None
+
+    def change(self, name: str, group: Group) -> Change | None:
+        """How a metric changed from the first group."""
+        return change_of(name, self.groups[0], group)
+
+    def as_json(self) -> dict[str, Any]:
+        """JSON of ``compare``; lists of groups' values are in the order of the groups."""
+        return {
+            "groups": [
+                {
+                    "name": group.label,
+                    "path": str(group.path),
+                    "kind": group.kind,
+                    "samples": len(group.samples),
+                }
+                for group in self.groups
+            ],
+            "verdict": {"best": self.verdict.best, "text": self.verdict.text},
+            "notes": list(self.notes),
+            "differences": {key: list(map(list, values)) for key, values in self.differences.items()},
+            "metrics": {name: self._metric(name) for name in self.metrics()},
+            "failed": [
+                {"if": each.condition.text, "group": each.group, "value": each.value, "text": each.text}
+                for each in self.failures
+            ],
+        }
+
+    def _metric(self, name: str) -> dict[str, Any]:
+        goal = goal_of(name)
+        spreads = [self.spread(name, group) for group in self.groups]
+        changes = [self.change(name, group) for group in self.groups[1:]]
+        return {
+            "better": None if goal is None else str(goal),
+            "groups": [None if each is None else asdict(each) for each in spreads],
+            "against_first": [None if each is None else asdict(each) for each in changes],
+        }
+
+
+def compared(groups: Sequence[Group], failures: Sequence[Failure] = ()) -> Comparison:
+    """Compare at least two groups of one kind."""
+    differences = differences_of(groups)
+    return Comparison(
+        tuple(groups), differences, verdict_on(groups), tuple(_notes(groups, differences)), tuple(failures)
+    )
+
+
+def differences_of(groups: Sequence[Group]) -> dict[str, tuple[tuple[str, ...], ...]]:
+    """Conditions whose values are not the same in all groups; empty values for a group that knows none."""
+    facts = [group.facts() for group in groups]
+    keys = dict.fromkeys(key for each in facts for key in each)
+    values = {key: tuple(each.get(key, ()) for each in facts) for key in keys}
+    return {key: each for key, each in values.items() if len(set(map(frozenset, each))) > 1}
+
+
+def shortened(values: Sequence[str]) -> str:
+    """Values of a condition in a few words."""
+    if not values:
+        return "–"
+    more = f" and {len(values) - _MOST_VALUES} more" if len(values) > _MOST_VALUES else ""
+    return ", ".join(values[:_MOST_VALUES]) + more
+
+
+_NOISE = ("mocap.", "robot.", "leader.", "run.duration_s", "duration_s")
+
+
+def _notes(groups: Sequence[Group], differences: dict[str, tuple[tuple[str, ...], ...]]) -> list[str]:
+    notes = []
+    harder = [key for key in differences if key.startswith(_NOISE)]
+    if harder:
+        named = ", ".join(harder[:_MOST_VALUES]) + (" and more" if len(harder) > _MOST_VALUES else "")
+        notes.append(
+            f"they did not run under the same conditions ({named}), so that metrics differ by that too"
+        )
+    if groups[0].kind == RUNS and any(len(group.samples) == 1 for group in groups):
+        notes.append("the spread of a single run is not known: name folders of several runs to have it")
+    if any(not each.facts for group in groups if group.kind == RUNS for each in group.samples):
+        notes.append("of some runs the log is gone, and with it their scenario and version")
+    if left_out := [group for group in groups if len(group.samples) < len(group.tree.get("cells", ()))]:
+        names = ", ".join(group.label for group in left_out)
+        notes.append(f"cells of {names} that not all of them have are left out")
+    return notes

@@ -1,0 +1,90 @@
+"""A comparison as a person reads it in a terminal: verdict, differences, metrics side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from hil.compare.comparison import Comparison, shortened
+from hil.compare.group import Group, Spread
+from hil.compare.metrics import is_told, shown, unit_of
+
+
+def comparison_text(comparison: Comparison) -> str:
+    """All of it as text, a line each."""
+    lines = [comparison.verdict.text, *(f"! {note}" for note in comparison.notes), ""]
+    groups = comparison.groups
+    header = ["", *(f"{group.label} ({group.noun()})" for group in groups)]
+    if comparison.differences:
+        rows = [[key, *map(shortened, values)] for key, values in comparison.differences.items()]
+        lines += [*_aligned([["differs", *header[1:]], *rows], right=False), ""]
+    else:
+        lines += ["no difference in scenario, version, law and seed", ""]
+    told = [name for name in comparison.metrics() if is_told(name)]
+    same = [name for name in told if is_same(comparison, name)]
+    rows = [metric_row(comparison, name) for name in told if name not in same]
+    lines += _aligned([["median (quartiles)", *_with_change(header[1:])], *rows], right=True)
+    if same:
+        lines.append(f"the same in all: {', '.join(same)}")
+    if more := sum(not is_told(name) for name in comparison.metrics()):
+        lines.append(f"{more} metrics more with --json and in compare.html")
+    return "\n".join([*lines, ""])
+
+
+def _with_change(labels: Sequence[str]) -> list[str]:
+    return [labels[0], *(text for label in labels[1:] for text in (label, "against the first"))]
+
+
+def metric_row(comparison: Comparison, name: str) -> list[str]:
+    """A metric's name with its unit, then its value in each group, behind all but the first its change."""
+    unit = unit_of(name)[0]
+    first, *others = comparison.groups
+    cells = [f"{name} [{unit}]" if unit else name, spread_text(name, comparison.spread(name, first))]
+    for group in others:
+        cells += [spread_text(name, comparison.spread(name, group)), change_text(comparison, name, group)]
+    return cells
+
+
+def change_text(comparison: Comparison, name: str, group: Group) -> str:
+    """By how much a metric changed from the first group, whether that is better, and whether it is chance."""
+    change, first = comparison.change(name, group), comparison.spread(name, comparison.groups[0])
+    if change is None or first is None:
+        return "–"
+    if change.is_none(first.median):
+        return "same"
+    if change.ratio is not None and math.isfinite(change.ratio):
+        told = f"× {change.ratio:.3g}"
+    else:
+        told = f"{'+' * (change.difference > 0.0)}{shown(name, change.difference)}"
+    if change.better is not None:
+        told += " better" if change.better else " worse"
+    if change.better is not None and change.pairs:
+        told += f" {change.better_in if change.better else change.worse_in}/{change.pairs}"
+    return told + (", chance?" if change.may_be_chance else "")
+
+
+def is_same(comparison: Comparison, name: str) -> bool:
+    """Whether all groups have the same median of a metric."""
+    first = comparison.spread(name, comparison.groups[0])
+    changes = [comparison.change(name, group) for group in comparison.groups[1:]]
+    return first is not None and all(each is not None and each.is_none(first.median) for each in changes)
+
+
+def spread_text(name: str, spread: Spread | None) -> str:
+    """A median with its quartiles, where there are several values."""
+    if spread is None:
+        return "–"
+    if spread.n == 1:
+        return shown(name, spread.median)
+    return f"{shown(name, spread.median)} ({shown(name, spread.q25)} to {shown(name, spread.q75)})"
+
+
+def _aligned(rows: Sequence[Sequence[str]], *, right: bool) -> Iterator[str]:
+    """Rows of cells in columns; all but the first to the right."""
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    for row in rows:
+        cells = [
+            cell.rjust(width) if right and column else cell.ljust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        yield "  ".join(cells).rstrip()
