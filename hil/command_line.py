@@ -26,6 +26,7 @@ COMMANDS = {
     "recover": "make a log whole that was cut off or damaged",
     "doctor": "what is wrong in a lab before anything moves, and what to do about it",
     "status": "daemons, bodies and robots of a lab, live",
+    "live": "a page in the browser that shows a lab while it drives, and stops it",
     "stop": "stop all robots of a lab",
     "arm": "let robots be driven again that their guards hold",
     "guard": "the guard of a robot, between the wire and its driver, as a daemon",

@@ -34,8 +34,8 @@ ROOMS = {
     ),
     "hil": (
         "extensions", "scenario", "wire", "guard", "log", "nodes", "emulator", "lockstep", "live", "bridge",
-        "doctor", "replay", "recordings", "judge", "figures", "reports", "sweep", "compare", "simulate",
-        "faults", "soak", "commands",
+        "doctor", "replay", "recordings", "judge", "figures", "reports", "live_page", "sweep", "compare",
+        "simulate", "faults", "soak", "commands",
     ),
 }  # fmt: skip
 """Rooms of the packages that have some, lower ones first: each may import those before it."""
@@ -232,7 +232,14 @@ def test_the_wheel_holds_the_packages_the_scenarios_and_the_maps(tmp_path: Path)
         named(path) for path in (ROOT / "hil" / "wire" / "msg").rglob("*.msg")
     }
     assert sources <= held
-    rest = held - data - sources
+    page = {
+        named(path)
+        for path in (ROOT / "hil" / "live_page").iterdir()
+        if path.suffix in (".html", ".css", ".js")
+    }
+    assert len(page) == 6
+    assert page <= held
+    rest = held - data - sources - page
     assert {Path(name).name for name in rest} <= {"py.typed"}
     assert {"METADATA", "RECORD", "entry_points.txt", "licenses/LICENSE"} <= records
 

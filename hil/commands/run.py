@@ -14,6 +14,7 @@ from formation.collector import collector_paused
 from hil.commands.guard_option import NO_GUARD
 from hil.commands.outputs import OutputFolder, new_folder
 from hil.commands.own_parts import load_own_parts
+from hil.commands.page_options import PagePlace, page_options, page_place, shown_page
 from hil.commands.seconds import DURATION, Seconds
 from hil.errors import AbreastError, CheckFailedError, InterruptedRunError, UsageError
 from hil.judge.made_by import law_failure
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from hil.wire.session import Endpoints
 
 
-@click.command("run")
+@click.command("run", params=page_options())
 @click.argument("scenario", default="turtlebot3")
 @click.option("--duration", type=DURATION, metavar="S", help="Seconds from the leader's start to the stop.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all noise.")
@@ -77,6 +78,7 @@ if TYPE_CHECKING:
     metavar="DIR",
     help="Keys of all that takes part, by abreast secure init.",
 )
+@click.option("--live", "page", is_flag=True, help="Show it in a browser, and stop it there.")
 @click.option("--apart", is_flag=True, help="Estimator and controller as two processes, live.")
 @click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override any key of the scenario."
@@ -99,6 +101,7 @@ def command(
     **live: Any,
 ) -> None:
     """Drive SCENARIO (a shipped name or a TOML file) through the whole chain, log it and judge it."""
+    place = page_place(live)
     how = _how(**live)
     given = {"run.duration_s": duration, "run.seed": seed, "estimator.kind": estimator, "controller.law": law}
     options = [f"{key}={value}" for key, value in given.items() if value is not None]
@@ -113,6 +116,8 @@ def command(
     if how is not None and (emulated := chosen.source.emulated):
         refuse_chain(chosen, "--emulate is for a pair: leave it out")
         how = replace(how, crew=replace(how.crew, emulate=emulated))
+    if how is not None:
+        how = replace(how, page=place)
     load_own_parts(chosen)
     folder = _folder(chosen, out)
     with claimed(folder):
@@ -121,11 +126,12 @@ def command(
 
 @dataclass(frozen=True, slots=True)
 class _Live:
-    """How to run live: where all meet, None for a free port, and who takes part."""
+    """How to run live: where all meet, None for a free port, who takes part, and where it is shown."""
 
     endpoints: Endpoints | None
     crew: Crew
     keys: RoleKeys | None = None
+    page: PagePlace | None = None
 
 
 def _how(
@@ -264,12 +270,19 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> Outcome:
         status = held.enter_context(starting)
         if live.crew.real:
             console.print(Text(f"robots and bridges connect to {endpoints.describe()}"), soft_wrap=True)
-        lines = FindingLines(lambda line: console.print(Text(line), soft_wrap=True))
+
+        def say(line: str) -> None:
+            console.print(Text(line), soft_wrap=True)
+
+        page = held.enter_context(shown_page(live.page, endpoints, say)) if live.page else None
+        lines = FindingLines(say)
         # Who does not watch a terminal is told as well, once for whatever is waited for.
         aside = Console(file=sys.stderr, quiet=console.is_terminal)
         waiting = WaitingLines(lambda line: aside.print(Text(line), soft_wrap=True))
 
         def show(snapshot: Snapshot, elapsed: float | None) -> None:
+            if page is not None:
+                page.see_to(log_path.parent / "scenario.toml", endpoints.joining)
             for node, findings in list(snapshot.findings.items()):
                 lines.note(node, findings)
             # What is on the wire may look like markup.

@@ -23,6 +23,7 @@ from hil.wire.events import Event
 from hil.wire.intake import Intake
 from hil.wire.key_layout import OURS, KeyLayout
 from hil.wire.messages import MalformedPayloadError, decode_as, to_ns
+from hil.wire.newest import Newest
 from hil.wire.outlet import origin_of, sender_of
 from hil.wire.topics import Topics
 from hil.wire.undeclare import undeclare
@@ -148,23 +149,20 @@ class RunMonitor:
         self._updated_at = time.monotonic()
         self._intake = Intake()
         self._diagnostics = session.declare_subscriber(layout.heard(topics.DIAGNOSTICS), self._on_diagnostics)
-        self._newest = {
-            topic: session.declare_subscriber(layout.heard(topic), zenoh.handlers.RingChannel(1))
-            for topic in (topics.STOP, *wheels, *(topic for pair in pairs for topic in _told_of(pair)))
-        }
+        told = (topic for pair in pairs for topic in _told_of(pair))
+        self._newest = Newest(session, layout, dict.fromkeys((topics.STOP, *wheels, *told), 1))
         self._pairs, self._wheels = pairs, wheels
 
     def update(self) -> Snapshot:
         """The snapshot as of now. Payloads are decoded here, not in Zenoh's threads."""
-        samples = {topic: newest.try_recv() for topic, newest in self._newest.items()}
-        latest = {topic: sample.payload.to_bytes() for topic, sample in samples.items() if sample is not None}
+        came = {event.topic: event for event in self._newest.take()}
+        latest = {topic: event.payload for topic, event in came.items()}
         snapshot, now = self.snapshot, time.monotonic()
         snapshot.advance(now - self._updated_at)
         self._updated_at = now
         if topics.STOP in latest and snapshot.stopped is None:
             snapshot.stopped = stop_reason(latest[topics.STOP])
-            stop = samples[topics.STOP]
-            snapshot.stopped_by = sender_of(origin_of(stop) if stop is not None else None)
+            snapshot.stopped_by = sender_of(came[topics.STOP].origin)
         for pair in self._pairs:
             who = pair.follower
             if seen := _sound(latest, pair.estimate, msg.LeaderEstimate):
@@ -186,8 +184,7 @@ class RunMonitor:
     def close(self) -> None:
         """End the subscriptions."""
         undeclare(self._diagnostics)
-        undeclare(*self._newest.values())
-        self._newest.clear()
+        self._newest.close()
 
     def _on_diagnostics(self, sample: zenoh.Sample) -> None:
         said = Event(topics.DIAGNOSTICS, sample.payload.to_bytes(), origin_of(sample))

@@ -1,0 +1,1 @@
+"""The page that shows a lab in a browser while it drives, and stops it."""
