@@ -34,7 +34,7 @@ ROOMS = {
     ),
     "hil": (
         "extensions", "scenario", "wire", "guard", "log", "nodes", "emulator", "lockstep", "live", "bridge",
-        "doctor", "replay", "recordings", "judge", "figures", "reports", "sweep", "simulate",
+        "doctor", "replay", "recordings", "judge", "exports", "figures", "reports", "sweep", "simulate",
         "faults", "soak", "commands",
     ),
 }  # fmt: skip
