@@ -13,15 +13,14 @@ from estimation.tracking.estimate import QUANTITIES
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray, wrap
 from hil.exports.aligned_columns import ALIGNED_COLUMNS, SHAPE, TRUE_POSES
-from hil.exports.logged_run import LoggedRun, Refusals, Table
+from hil.exports.logged_run import DIAGONAL, LoggedRun, Refusals, Table
 from hil.judge.columns import EstimateColumns
 from hil.judge.estimation import errors_at
 from hil.judge.true_states import Stamps, TrueStates
 from hil.log.cdr_columns import Array, Values
 
-_ROWS = 1 << 16
+_ROWS = 1 << 14
 _S = 1e-9
-_DIAGONAL = 6
 _OWN = ("v2", "u2")
 _BOUNDS = ("bound_v1", "bound_alpha1", "bound_h")
 _RADII = ("radius_v1", "radius_alpha1")
@@ -64,7 +63,7 @@ def _columns(run: LoggedRun, estimates: Table) -> dict[str, Values]:
 
 def _as_judged(estimates: Table, at_ns: Stamps) -> EstimateColumns:
     numbers = {name: cast("FloatArray", values) for name, values in estimates.items()}
-    diagonal = [numbers[f"covariance.{_DIAGONAL * place}"] for place in range(len(QUANTITIES))]
+    diagonal = [numbers[f"covariance.{DIAGONAL * place}"] for place in range(len(QUANTITIES))]
     variances = np.column_stack(diagonal)
     seen = Perceived(*(numbers[name] for name in (*SHAPE[:-1], *_OWN)))
     return EstimateColumns(

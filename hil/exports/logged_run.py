@@ -28,6 +28,9 @@ from hil.wire.topics import link_topics
 
 _AT_ONCE = 1 << 14
 _REFUSED = "refused."
+DIAGONAL = 6
+"""One in so many entries of an estimate's covariance is a variance."""
+
 Table = Mapping[str, Array]
 """Numbers and texts of messages by their fields' names, times in ns; without lists."""
 
@@ -122,7 +125,9 @@ class _Gathered:
 
     def table(self) -> Table:
         self._decode()
-        return {name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]}
+        # Column by column, so that there is never twice as much of it.
+        names = list(self._parts[0])
+        return {name: np.concatenate([part.pop(name) for part in self._parts]) for name in names}
 
     def _decode(self) -> None:
         payloads, self._payloads = (self._payloads if self._taken else []), []
@@ -130,11 +135,16 @@ class _Gathered:
         part = {
             field.name: values
             for field, values in zip(self._fields, found.values, strict=True)
-            if not isinstance(values, Lists)
+            if not isinstance(values, Lists) and not _is_off_diagonal(field.name)
         }
         times = [part[field.name] for field in self._fields if field.is_time and field.name in part]
         right = np.all([at >= 0 for at in times], axis=0)
         self._parts.append({name: values[right] for name, values in part.items()})
+
+
+def _is_off_diagonal(name: str) -> bool:
+    field, _, number = name.partition(".")
+    return field == "covariance" and int(number) % DIAGONAL != 0
 
 
 def _table_of(kind: type[msg.Message], messages: Iterable[msg.Message]) -> Table:

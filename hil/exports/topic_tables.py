@@ -19,7 +19,7 @@ from hil.log.reader import Log
 from hil.log.table_column import TableColumn
 from hil.wire.messages import definition, known_types, typestore_of
 
-_MOST_ROWS, _MOST_BYTES = 1 << 15, 1 << 23
+_MOST_ROWS, _MOST_BYTES = 1 << 14, 1 << 22
 _S = 1e-9
 
 TIMES = (
