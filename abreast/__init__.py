@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from abreast._estimates import Estimates
     from abreast._estimation import estimate
     from abreast._lockstep import run_lockstep
-    from abreast._logs import read_log, replay
+    from abreast._logs import export, read_log, replay
     from abreast._runs import Run
     from abreast._scenarios import load_scenario, scenarios
     from controllers.own_law import Gains, Leader, Shape
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from formation.pose import Motion
     from hil import __version__
     from hil.errors import CheckFailedError, UsageError
+    from hil.exports.table_export import TableExport
     from hil.log.reader import Log
     from hil.replay.lab_calibration import Calibration
     from hil.scenario.schema import Scenario
@@ -48,11 +49,13 @@ __all__ = [
     "Shape",
     "Simulation",
     "SweepResult",
+    "TableExport",
     "UsageError",
     "__version__",
     "bounds",
     "calibrate",
     "estimate",
+    "export",
     "gains",
     "load_scenario",
     "read_log",
@@ -79,11 +82,13 @@ _HOMES = {
     "Shape": "controllers.own_law",
     "Simulation": "hil.simulate.simulation",
     "SweepResult": "abreast._analyses",
+    "TableExport": "hil.exports.table_export",
     "UsageError": "hil.errors",
     "__version__": "hil",
     "bounds": "abreast._analyses",
     "calibrate": "abreast._analyses",
     "estimate": "abreast._estimation",
+    "export": "abreast._logs",
     "gains": "abreast._analyses",
     "load_scenario": "abreast._scenarios",
     "read_log": "abreast._logs",

@@ -9,6 +9,8 @@ from abreast._runs import Run, run_of
 from abreast._scenarios import Own, text_of
 from formation.collector import collector_paused
 from hil.errors import CheckFailedError
+from hil.exports.table_export import TableExport, export_tables, refuse_present
+from hil.exports.table_file import Format
 from hil.judge.replayed import ReplayChoice, replayed
 from hil.log.opened import opened_log
 from hil.log.reader import Log
@@ -90,3 +92,44 @@ def replay(
     if verify and (reason := done.why_not_same(given)):
         raise CheckFailedError(reason)
     return run_of(done.summary, done.runs)
+
+
+@collector_paused()
+def export(
+    log: LogLike,
+    folder: str | os.PathLike[str],
+    *,
+    form: Format = "parquet",
+    estimator: Own | None = None,
+    overrides: Overrides = (),
+    leader: str | None = None,
+    follower: str | None = None,
+    topic_map: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
+) -> TableExport:
+    """Write a log as tables: ``aligned``, a row for each estimate, and ``topics``, one for each topic.
+
+    ``form``: parquet or csv. Estimates are those of the log, unless one of the others asks for new ones, as
+    :func:`abreast.replay` makes them, or it has none. Raises :class:`UsageError` for a log that cannot be
+    read or replayed so, and for a folder that has an export already, unless ``overwrite``.
+
+    >>> import abreast, pandas
+    >>> scenario = abreast.load_scenario("turtlebot3", {"run.duration_s": 2.0})
+    >>> run = abreast.run_lockstep(scenario, log="exported.mcap")
+    >>> done = abreast.export("exported.mcap", "tables")
+    >>> table = pandas.read_parquet("tables/aligned.parquet")
+    >>> len(table) == done.rows["follower"] == len(run.estimates)
+    True
+    """
+    place = Path(folder)
+    if not overwrite:
+        refuse_present(place)
+    choice = ReplayChoice(
+        estimator=text_of(estimator),
+        leader=leader,
+        follower=follower,
+        chart=None if topic_map is None else os.fspath(topic_map),
+        overrides=overrides,
+        in_messages=True,
+    )
+    return export_tables(log_of(log), place, form, choice)

@@ -22,6 +22,7 @@ COMMANDS = {
     "compare": "runs, logs or sweeps beside each other: what differs, and which was better",
     "gains": "propose gains for a scenario, with the reason for each",
     "import": "turn other recordings into logs",
+    "export": "a log as tables for pandas, polars and others: estimates beside the truth, and every topic",
     "calibrate": "find the offsets of a range and bearing sensor that mocap has watched",
     "recover": "make a log whole that was cut off or damaged",
     "doctor": "what is wrong in a lab before anything moves, and what to do about it",

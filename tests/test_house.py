@@ -34,8 +34,8 @@ ROOMS = {
     ),
     "hil": (
         "extensions", "scenario", "wire", "guard", "log", "nodes", "emulator", "lockstep", "live", "bridge",
-        "doctor", "replay", "recordings", "judge", "figures", "reports", "live_page", "sweep", "compare",
-        "simulate", "faults", "soak", "commands",
+        "doctor", "replay", "recordings", "judge", "exports", "figures", "reports", "live_page", "sweep",
+        "compare", "simulate", "faults", "soak", "commands",
     ),
 }  # fmt: skip
 """Rooms of the packages that have some, lower ones first: each may import those before it."""

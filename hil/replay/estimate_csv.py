@@ -13,22 +13,12 @@ from estimation.tracking.estimate import QUANTITIES
 from estimation.tracking.tracker import Status
 from hil.errors import UsageError
 from hil.log.written_aside import written_aside
+from hil.replay.estimate_columns import ESTIMATE_COLUMNS
 from hil.replay.kept import Array
 from hil.replay.kept_rows import EstimateRow, estimate_row
 from hil.wire.estimate_layout import read_estimate
 from hil.wire.message_types import LeaderEstimate
 from hil.wire.messages import encode
-
-FIELDS = (
-    "t",
-    "rho",
-    "alpha2",
-    *QUANTITIES,
-    *(f"sd_{name}" for name in QUANTITIES),
-    "bound_v1",
-    "bound_alpha1",
-    "status",
-)
 
 
 def write_estimates(estimates: Iterable[LeaderEstimate] | Array, path: Path) -> None:
@@ -46,7 +36,7 @@ def write_estimates(estimates: Iterable[LeaderEstimate] | Array, path: Path) -> 
     try:
         with written_aside(path) as aside, aside.open("w", encoding="utf-8", newline="") as stream:
             writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(FIELDS)
+            writer.writerow(ESTIMATE_COLUMNS)
             writer.writerows(map(_cells, rows))
     except OSError as error:
         raise UsageError(f"{path}: cannot be written ({error.strerror}); give another place") from None

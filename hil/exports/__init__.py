@@ -1,0 +1,1 @@
+"""Logs as tables, and for the viewers of others."""

@@ -1,0 +1,61 @@
+"""``abreast export`` as a user types it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from hil.command_line import main
+from hil.exports import table_file
+from hil.log.reader import Log
+
+
+def said(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int | str | None, str, str]:
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as left:
+        main([str(argument) for argument in ("export", *arguments)])
+    caught = capsys.readouterr()
+    return left.value.code, caught.out, caught.err
+
+
+def test_it_says_on_stdout_what_it_wrote(
+    short_log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = said(capsys, short_log.path, "--to", tmp_path / "out")
+    assert (code, err) == (0, "")
+    paths = [Path(line.partition(": ")[0]) for line in out.splitlines()]
+    assert tmp_path / "out/aligned.parquet" in paths
+    assert all(pl.read_parquet(path).height for path in paths)
+    code, out, err = said(capsys, short_log.path, "--to", tmp_path / "out")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "--overwrite" in err
+    code, out, err = said(capsys, short_log.path, "--to", tmp_path / "out", "--overwrite", "--json")
+    assert code == 0
+    assert json.loads(out)["aligned"] == str(tmp_path / "out/aligned.parquet")
+
+
+def test_without_pyarrow_tables_are_csv(
+    short_log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(table_file, "has_parquet", lambda: False)
+    code, out, err = said(capsys, short_log.path, "--to", tmp_path / "out")
+    assert code == 0
+    assert "pyarrow" in err
+    assert (tmp_path / "out/aligned.csv").is_file()
+    assert "aligned.csv" in out
+
+
+def test_a_damaged_log_leaves_what_is_whole_and_exits_with_1(
+    short_log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    torn = bytearray(short_log.path.read_bytes())
+    middle = short_log.chunks[len(short_log.chunks) // 2].offset + 100
+    torn[middle : middle + 40] = bytes(40)
+    (tmp_path / "torn.mcap").write_bytes(torn)
+    code, _, err = said(capsys, tmp_path / "torn.mcap", "--to", tmp_path / "out")
+    assert code == 1
+    assert "damaged" in err.splitlines()[-1]
+    assert (tmp_path / "out/aligned.parquet").is_file()
