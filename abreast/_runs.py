@@ -23,8 +23,8 @@ _S = 1e-9
 class Truth:
     """The true states at n times, those of the estimates: arrays of shape (n,), NaN where not known.
 
-    ``leader``, ``follower`` (n, 3): x, y [m], theta [rad]. All else as in :class:`Estimates`; ``v2`` [m/s],
-    ``u2`` [rad/s]: what the follower really drives.
+    ``leader``, ``follower`` (n, 3): x, y [m], theta [rad]. All else as in :class:`abreast.Estimates`;
+    ``v2`` [m/s], ``u2`` [rad/s]: what the follower really drives.
     """
 
     t: FloatArray
