@@ -81,7 +81,8 @@ def command(
     for cell, run in to_keep:
         click.echo(f"kept {keep_run(sweep, folder, cell, run)}", err=True)
     write_results(sweep, result, folder)
-    click.echo(f"results in {folder}, look at {folder / 'report.html'}", err=True)
+    report = folder / "report.html"
+    click.echo(f"results in {folder}" + (f", look at {report}" if report.exists() else ""), err=True)
     if as_json:
         print_json(result)
     if reason := law_failure(sweep, result):
