@@ -12,7 +12,7 @@ import click
 from formation.collector import collector_paused
 from hil import __version__
 from hil.errors import AbreastError, UsageError
-from hil.extras import missing_extra, needs_extra
+from hil.extras import is_left_out, needs_extra
 
 COMMANDS = {
     "run": "the main job: emulated robots, estimator, controller, recorder; live or in lockstep",
@@ -100,9 +100,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.stderr.close()
         code = 1
     except ModuleNotFoundError as error:
-        if not missing_extra(error):
+        if not is_left_out(error):
             raise
-        _say(f"abreast: {needs_extra('this', error)}")
+        _say(f"abreast: {needs_extra(given[0], error)}")
         code = 2
     except OSError as error:
         # A full disk, say, on the way.

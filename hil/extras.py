@@ -8,7 +8,9 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 
+from formation.kernel import compiles
 from hil.errors import UsageError
 
 EXTRA_OF = {
@@ -30,24 +32,36 @@ LEFT_OUT = frozenset({"numba", "llvmlite", "scipy"})
 
 
 def missing_extra(error: BaseException | None) -> str:
-    """What brings the module that an import did not find, as pip takes it; empty if none of ours does.
+    """The extra that brings the module which an import did not find; empty if none of ours does.
 
     >>> missing_extra(ModuleNotFoundError(name="bokeh.palettes"))
-    'abreast[report]'
+    'report'
     """
-    if not isinstance(error, ModuleNotFoundError):
-        return ""
-    name = (error.name or "").partition(".")[0]
-    if name in LEFT_OUT:
-        return "abreast"
-    return f"abreast[{EXTRA_OF[name]}]" if name in EXTRA_OF else ""
+    return EXTRA_OF.get(_top(error), "") if isinstance(error, ModuleNotFoundError) else ""
+
+
+def is_left_out(error: ModuleNotFoundError) -> bool:
+    """Whether what an import did not find is of ours: of an extra, or left out for daemons alone."""
+    return bool(missing_extra(error)) or _top(error) in LEFT_OUT
 
 
 def needs_extra(what: str, error: ModuleNotFoundError) -> UsageError:
     """The line for who asked for something that cannot be done without a library that is missing."""
-    return UsageError(
-        f"{what}: needs {error.name}, which is not installed; pip install '{missing_extra(error)}'"
-    )
+    brings = f"pip install 'abreast[{missing_extra(error)}]'"
+    if _top(error) in LEFT_OUT:
+        brings = "pip install abreast in an environment that has no abreast-daemon"
+    return UsageError(f"{what}: needs {_top(error)}, which is not installed; {brings}")
+
+
+def _top(error: ImportError) -> str:
+    return (error.name or "").partition(".")[0]
+
+
+def why_interpreted() -> str:
+    """Why nothing is compiled here; empty where it is."""
+    if compiles():
+        return ""
+    return "ABREAST_INTERPRETED is set" if find_spec("numba") else "numba is not installed"
 
 
 @contextmanager
@@ -61,4 +75,4 @@ def left_out_if_missing(what: str) -> Iterator[None]:
     except ModuleNotFoundError as error:
         if not (extra := missing_extra(error)):
             raise
-        print(f"no {what}: pip install '{extra}'", file=sys.stderr)  # noqa: T201
+        print(f"no {what}: pip install 'abreast[{extra}]'", file=sys.stderr)  # noqa: T201

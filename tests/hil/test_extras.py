@@ -139,5 +139,4 @@ def test_an_estimator_without_its_library_is_one_line(tmp_path: Path) -> None:
 def test_what_is_no_extra_is_raised_as_it_is() -> None:
     with pytest.raises(ModuleNotFoundError), left_out_if_missing("soup"):
         raise ModuleNotFoundError("No module named 'spoon'", name="spoon")
-    assert missing_extra(ModuleNotFoundError("No module named 'numba'", name="numba")) == "abreast"
     assert not missing_extra(ImportError("cannot import name", name="bokeh"))
