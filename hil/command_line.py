@@ -12,6 +12,7 @@ import click
 from formation.collector import collector_paused
 from hil import __version__
 from hil.errors import AbreastError, UsageError
+from hil.extras import is_left_out, needs_extra
 
 COMMANDS = {
     "run": "the main job: emulated robots, estimator, controller, recorder; live or in lockstep",
@@ -101,6 +102,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except BrokenPipeError:
         sys.stderr.close()
         code = 1
+    except ModuleNotFoundError as error:
+        if not is_left_out(error):
+            raise
+        _say(f"abreast: {needs_extra(given[0], error)}")
+        code = 2
     except OSError as error:
         # A full disk, say, on the way.
         _say(f"abreast: {error.filename or 'a file'}: {error.strerror or error}")

@@ -40,10 +40,10 @@ ROOMS = {
 }  # fmt: skip
 """Rooms of the packages that have some, lower ones first: each may import those before it."""
 
-HALL = {"estimation": set[str](), "hil": {"__main__", "command_line", "errors"}}
+HALL = {"estimation": set[str](), "hil": {"__main__", "command_line", "errors", "extras"}}
 """What lies outside all rooms of a package, besides its ``__init__``."""
 
-FROM_HALL = {"hil", "hil.errors"}
+FROM_HALL = {"hil", "hil.errors", "hil.extras"}
 """What the rooms may import from there."""
 
 COMMAND = "hil/__main__.py"

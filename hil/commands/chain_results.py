@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import CheckFailedError
+from hil.extras import left_out_if_missing
 from hil.judge.chain_pairs import driven_trajectory
 from hil.judge.chain_summary import summarise_chain
 from hil.judge.chain_text import print_chain
@@ -64,9 +65,10 @@ def _write(
     if trajectory is None:
         note("no picture: the log does not tell where the robots really were")
         return
-    from hil.figures.chain_figures import draw_chain
+    with left_out_if_missing(picture):
+        from hil.figures.chain_figures import draw_chain
 
-    draw_chain(scenario, trajectory, float(trajectory.t[-1]), folder / picture)
+        draw_chain(scenario, trajectory, float(trajectory.t[-1]), folder / picture)
 
 
 def _refuse_violated(log: Log, summary: dict[str, Any]) -> None:

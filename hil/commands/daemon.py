@@ -15,6 +15,7 @@ from hil.commands.outputs import OutputFile
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION, Seconds
 from hil.commands.wire_options import endpoints_of, wire_options
+from hil.extras import why_interpreted
 from hil.log.report_json import note
 from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario
@@ -57,6 +58,8 @@ def daemon_command(name: str, summary: str) -> click.Command:
         alone = options.natnet and not (connect or listen or zenoh_config or secure)
         chosen = load_scenario(scenario, (*overrides, CERTIFY) if certify else overrides)
         chosen = with_guards(chosen, present=not no_guard)
+        if (why := why_interpreted()) and not tethered:
+            note(f"abreast {name}: interpreted, as {why}: slower, bit for bit the same")
         if name in HOSTED:
             load_own_parts(chosen, estimates=name != "controller")
         needed = frozenset(filter(None, needs.split(",")))

@@ -11,6 +11,7 @@ from formation.collector import collector_paused
 from hil.commands.outputs import OutputFile, OutputFolder
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
+from hil.extras import why_interpreted
 from hil.log.report_json import note, print_json, print_text, results_apart, say
 from hil.reports.judged_log import leave, made_folder, results_in
 
@@ -81,6 +82,8 @@ def command(
     from hil.judge.replayed import ReplayChoice, chain_in, replayed
     from hil.judge.summary_text import print_summary
 
+    if why := why_interpreted():
+        note(f"abreast replay: interpreted, as {why}: a verdict takes minutes")
     choice = ReplayChoice(
         estimator=estimator,
         law=law,

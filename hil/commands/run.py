@@ -17,6 +17,7 @@ from hil.commands.own_parts import load_own_parts
 from hil.commands.page_options import PagePlace, page_options, page_place, shown_page
 from hil.commands.seconds import DURATION, Seconds
 from hil.errors import AbreastError, CheckFailedError, InterruptedRunError, UsageError
+from hil.extras import why_interpreted
 from hil.judge.made_by import law_failure
 from hil.live.crew import Crew
 from hil.log.report_json import note, print_json, results_apart, say
@@ -118,6 +119,8 @@ def command(
         how = replace(how, crew=replace(how.crew, emulate=emulated))
     if how is not None:
         how = replace(how, page=place)
+    if why := why_interpreted():
+        note(f"abreast run: interpreted, as {why}: a verdict takes minutes")
     load_own_parts(chosen)
     folder = _folder(chosen, out)
     with claimed(folder):

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from hil.commands.guard_option import NO_GUARD
-from hil.errors import UsageError
+from hil.extras import needs_extra
 from hil.log.report_json import say
 
 
@@ -51,7 +51,7 @@ def init(
     try:
         from hil.live.tls_keys import Deployment, make_keys
     except ModuleNotFoundError as error:
-        raise UsageError(f"secure: {error.name} is not installed; pip install 'abreast[secure]'") from None
+        raise needs_extra("secure", error) from None
     chosen = with_guards(load_scenario(scenario, overrides), present=not no_guard)
     now = datetime.datetime.now(datetime.UTC)
     wanted = Deployment(chosen, hosts, days)

@@ -13,7 +13,8 @@ from hil.commands.outputs import OutputFolder, new_folder
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
-from hil.log.report_json import print_json, results_apart, say
+from hil.extras import why_interpreted
+from hil.log.report_json import note, print_json, results_apart, say
 from hil.reports.judged_log import results_in
 from hil.sweep.spec import Sweep, load_sweep
 
@@ -74,6 +75,8 @@ def command(
     sweep = load_sweep(spec, overrides, runs=runs, seed=seed, duration_s=duration, estimators=names)
     for point in sweep.cells()[: len(sweep.spec.estimators)]:
         load_own_parts(sweep.scenario_of(point))
+    if why := why_interpreted():
+        note(f"abreast sweep: interpreted, as {why}: a run takes minutes")
     to_keep = [_parsed(sweep, text) for text in kept if text != "worst"]
     folder = out or new_folder("sweep")
     result = _fly(sweep, folder, workers or len(os.sched_getaffinity(0)), scheduler)

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import csv
-import io
+import math
 import re
 from collections import Counter
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.compute as pc
-import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from formation.angles import FloatArray
@@ -46,7 +43,7 @@ class Cells(NamedTuple):
     ``damaged``: numbers of lines that are no rows of it, each with what is wrong.
     """
 
-    columns: dict[str, pa.ChunkedArray]
+    columns: dict[str, list[str]]
     lines: NDArray[np.int64]
     damaged: dict[int, str]
 
@@ -114,26 +111,27 @@ def read_cells(
     no two alike. ``wanted``: those to read.
     """
     damaged: dict[int, str] = {}
-    kept: list[tuple[int, str]] = []
+    places = [names.index(name) for name in wanted]
+    columns: dict[str, list[str]] = {name: [] for name in wanted}
+    lines: list[int] = []
     for number, line in numbered:
         fault = _fault(line)
-        if fault is None:
-            kept.append((number, line))
-        else:
+        cells = [] if fault else _split(line, layout.delimiter)
+        if not fault and len(cells) != len(names):
+            counted = f"{len(cells)} cell{'s' if len(cells) != 1 else ''}"
+            fault = f"has {counted}, expected {len(names)}"
+        if fault:
             damaged[number] = fault
-    if layout.delimiter == " ":
-        kept = [(number, "\t".join(line.split())) for number, line in kept]
-    wrong: dict[int, str] = {}
+        else:
+            lines.append(number)
+            for column, place in zip(columns.values(), places, strict=True):
+                column.append(cells[place])
+    return Cells(columns, np.array(lines, dtype=np.int64), damaged)
 
-    def skip(row: pacsv.InvalidRow) -> str:
-        cells = f"{row.actual_columns} cell{'s' if row.actual_columns != 1 else ''}"
-        wrong[row.number - 1] = f"has {cells}, expected {row.expected_columns}"
-        return "skip"
 
-    table = _parsed([line for _, line in kept], names, layout, wanted, skip)
-    damaged |= {kept[k][0]: fault for k, fault in wrong.items()}
-    lines = np.array([number for k, (number, _) in enumerate(kept) if k not in wrong], dtype=np.int64)
-    return Cells({name: table.column(name) for name in wanted}, lines, damaged)
+def _split(line: str, delimiter: str) -> list[str]:
+    """Cells of one line; blanks around them may stay."""
+    return split_line(line, delimiter) if '"' in line or delimiter == " " else line.split(delimiter)
 
 
 def _fault(line: str) -> str | None:
@@ -142,59 +140,28 @@ def _fault(line: str) -> str | None:
     return "has a quote that is not closed" if line.count('"') % 2 else None
 
 
-def _parsed(
-    lines: Sequence[str], names: Sequence[str], layout: Layout, wanted: Collection[str], skip: object
-) -> pa.Table:
-    text = pa.string()
-    if not lines:
-        return pa.table({name: pa.array([], text) for name in wanted})
-    body = io.BytesIO("\n".join(lines).encode("utf-8", errors="replace"))
-    longest = max(len(line) for line in lines)
-    return pacsv.read_csv(
-        body,
-        # One thread, as the number of a line that does not fit is known to that alone.
-        read_options=pacsv.ReadOptions(
-            use_threads=False, column_names=list(names), block_size=max(1 << 22, 8 * longest)
-        ),
-        parse_options=pacsv.ParseOptions(
-            delimiter="\t" if layout.delimiter == " " else layout.delimiter, invalid_row_handler=skip
-        ),
-        convert_options=pacsv.ConvertOptions(
-            column_types=dict.fromkeys(wanted, text),
-            include_columns=list(wanted),
-            strings_can_be_null=False,
-        ),
-    )
-
-
-def texts(column: pa.ChunkedArray) -> list[str]:
+def texts(column: Sequence[str]) -> list[str]:
     """Cells without blanks around them."""
-    stripped: list[str] = pc.utf8_trim_whitespace(column).to_pylist()
-    return stripped
+    return [cell.strip() for cell in column]
 
 
-def numbers(column: pa.ChunkedArray, decimal: str) -> tuple[FloatArray, dict[int, str]]:
+def numbers(column: Sequence[str], decimal: str) -> tuple[FloatArray, dict[int, str]]:
     """Cells as numbers, NaN where there is nothing, and those that are no finite numbers by their row."""
-    cells = pc.utf8_trim_whitespace(column)
-    empty = pc.is_in(pc.utf8_lower(cells), value_set=pa.array(sorted(EMPTY)))
-    cells = pc.if_else(empty, pa.scalar(None, pa.string()), cells)
-    if decimal != ".":
-        cells = pc.replace_substring(cells, decimal, ".")
-    try:
-        values = pc.cast(cells, pa.float64())
-    except pa.ArrowInvalid:
-        plain = cells.to_pylist()
-        values = pa.array([None if cell is None else _number(cell) for cell in plain], pa.float64())
-    found: FloatArray = np.asarray(values).astype(np.float64)
-    given = np.asarray(pc.is_valid(cells))
-    wrong = np.flatnonzero(given & ~np.isfinite(found))
-    found[wrong] = np.nan
-    raw = column.combine_chunks() if len(wrong) else column
-    return found, {int(row): raw[int(row)].as_py().strip() for row in wrong}
+    values = np.full(len(column), np.nan)
+    wrong: dict[int, str] = {}
+    for row, cell in enumerate(column):
+        value = _number(cell if decimal == "." else cell.replace(decimal, "."))
+        if math.isfinite(value):
+            values[row] = value
+        elif (text := cell.strip()).lower() not in EMPTY:
+            wrong[row] = text
+    return values, wrong
 
 
 def _number(text: str) -> float:
     try:
-        return float(pc.cast(pa.scalar(text), pa.float64()).as_py())
-    except pa.ArrowInvalid:
-        return float("nan")
+        value = float(text)
+    except ValueError:
+        return math.nan
+    # Python takes underscores, and digits of all scripts.
+    return value if text.isascii() and "_" not in text else math.nan

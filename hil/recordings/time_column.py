@@ -9,7 +9,6 @@ from decimal import Decimal, InvalidOperation
 from typing import NamedTuple
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from hil.recordings.pair_log import Times
@@ -56,9 +55,6 @@ def read_times(cells: Sequence[str], scale: Decimal, offset: Decimal, decimal: s
     if plain:
         kind, scale = _since_1970(first if decimal == "." else first.replace(decimal, "."))
         plain = scale == 1
-    quick = _fixed_ns(cells) if plain else None
-    if quick is not None:
-        return ReadTimes(quick, kind)
     numbers = [_seconds(cell) for cell in cells]
     if not plain:
         numbers = [None if number is None else number * scale + offset for number in numbers]
@@ -78,18 +74,6 @@ def _since_1970(first: str) -> tuple[str, Decimal]:
         if number is not None and number > least:
             return f"{kind} since 1970", scale
     return "seconds", Decimal(1)
-
-
-def _fixed_ns(cells: Sequence[str]) -> Times | None:
-    """Times of cells that are all plain numbers of at most nine decimals; None if some are not."""
-    try:
-        fixed = pa.array(cells, pa.string()).cast(pa.decimal128(28, 9))
-    except pa.ArrowInvalid:
-        return None
-    # A decimal is an integer of 128 bits, its lower half first.
-    halves = np.frombuffer(fixed.buffers()[1], dtype="<i8").reshape(-1, 2)[: len(cells)]
-    fits = (halves[:, 0] >= 0) & (halves[:, 0] < LAST_NS) & (halves[:, 1] == 0)
-    return np.where(fits, halves[:, 0], -1)
 
 
 def _seconds(text: str) -> Decimal | None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hil.errors import UsageError
+from hil.extras import left_out_if_missing
 from hil.log.report_json import write_json
 from hil.log.written_aside import write_text_aside
 
@@ -59,13 +60,18 @@ def results_in(folder: Path) -> str:
 
 
 def leave(run_data: RunData, summary: Mapping[str, Any], folder: Path, picture: str) -> None:
-    """Write the summary of a run's data, its picture by the given name, and its report."""
+    """Write the summary of a run's data, its picture by the given name, and its report.
+
+    Where the extra is missing that draws them, the summary alone, and say so on stderr.
+    """
     # All that drawing needs: a second of imports, for those who ask only.
     from hil.figures.plot_data import PlotData
-    from hil.figures.run_figures import draw_run
-    from hil.reports.run_report import run_report
 
     write_json(summary, folder / "summary.json")
-    data = PlotData.of(run_data)
-    draw_run(data, summary, folder / picture)
-    write_text_aside(folder / "report.html", run_report(data, summary))
+    with left_out_if_missing(f"{picture} and no report.html"):
+        from hil.figures.run_figures import draw_run
+        from hil.reports.run_report import run_report
+
+        data = PlotData.of(run_data)
+        draw_run(data, summary, folder / picture)
+        write_text_aside(folder / "report.html", run_report(data, summary))

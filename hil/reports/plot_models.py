@@ -116,7 +116,7 @@ def bokeh_script() -> str:
     spec = find_spec("bokeh")
     folders = spec.submodule_search_locations if spec else None
     if not folders:
-        raise ModuleNotFoundError("No module named 'bokeh'")
+        raise ModuleNotFoundError("No module named 'bokeh'", name="bokeh")
     script = Path(folders[0]) / "server" / "static" / "js" / "bokeh.min.js"
     return script.read_text(encoding="utf-8")
 

@@ -11,7 +11,7 @@ from controllers.chain import ChainTrajectory
 from formation.angles import FloatArray
 from formation.closed_loop import IntegrationError
 from hil.errors import CheckFailedError, UsageError
-from hil.figures.chain_figures import draw_chain
+from hil.extras import left_out_if_missing
 from hil.judge.chain_pairs import EXACTLY, pair_figures, settling_times
 from hil.scenario import parts as scenario_parts
 from hil.scenario.noise_free_runs import chain_run
@@ -68,7 +68,10 @@ def _write(scenario: Scenario, trajectory: ChainTrajectory, settled: list[float 
         out.mkdir(parents=True, exist_ok=True)
         agents = (trajectory.poses, trajectory.v, trajectory.u)
         write_tracks(out / "trajectory.csv", trajectory.t, *agents, _shapes(trajectory))
-        draw_chain(scenario, trajectory, until, out / "chain.png")
+        with left_out_if_missing("chain.png"):
+            from hil.figures.chain_figures import draw_chain
+
+            draw_chain(scenario, trajectory, until, out / "chain.png")
     except OSError as error:
         raise UsageError(f"{out}: cannot be written ({error.strerror}); choose another --out") from error
 

@@ -15,7 +15,7 @@ from formation.closed_loop import IntegrationError
 from formation.flock_places import skein
 from formation.pose import Pose
 from hil.errors import CheckFailedError, UsageError
-from hil.figures.flock_figures import draw_flock
+from hil.extras import left_out_if_missing
 from hil.judge.chain_pairs import EXACTLY
 from hil.scenario import parts as scenario_parts
 from hil.scenario.schema import FlockSection, Scenario
@@ -153,6 +153,9 @@ def _write(scenario: Scenario, run: FlockRun, out: Path) -> None:
         out.mkdir(parents=True, exist_ok=True)
         agents = (trajectory.poses, trajectory.v, trajectory.u)
         write_tracks(out / "trajectory.csv", trajectory.t, *agents, further)
-        draw_flock(scenario, trajectory, run.off, run.files, out / "flock.png")
+        with left_out_if_missing("flock.png"):
+            from hil.figures.flock_figures import draw_flock
+
+            draw_flock(scenario, trajectory, run.off, run.files, out / "flock.png")
     except OSError as error:
         raise UsageError(f"{out}: cannot be written ({error.strerror}); choose another --out") from error

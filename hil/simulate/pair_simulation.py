@@ -13,8 +13,7 @@ from formation.periodic_orbit import PeriodicOrbit, find_orbit
 from formation.spacing import lyapunov
 from hil.errors import CheckFailedError, UsageError
 from hil.extensions.reference import is_reference
-from hil.figures.simulation_figures import draw_experiment, draw_simulation
-from hil.figures.stability_figures import draw_stability
+from hil.extras import left_out_if_missing
 from hil.judge.stability import PROVED_V1, Stability, stability_json, stability_of
 from hil.log.written_aside import written_aside
 from hil.scenario import parts as scenario_parts
@@ -121,8 +120,11 @@ def _write(scenario: Scenario, trajectory: Trajectory, orbit: PeriodicOrbit | No
     try:
         out.mkdir(parents=True, exist_ok=True)
         _write_csv(trajectory, out / "trajectory.csv")
-        draw_simulation(scenario, trajectory, orbit, out / "simulation.png")
-        draw_experiment(scenario, trajectory, out / "experiment.png")
+        with left_out_if_missing("simulation.png and no experiment.png"):
+            from hil.figures.simulation_figures import draw_experiment, draw_simulation
+
+            draw_simulation(scenario, trajectory, orbit, out / "simulation.png")
+            draw_experiment(scenario, trajectory, out / "experiment.png")
     except OSError as error:
         raise UsageError(f"{out}: cannot be written ({error.strerror}); choose another --out") from error
 
@@ -130,7 +132,10 @@ def _write(scenario: Scenario, trajectory: Trajectory, orbit: PeriodicOrbit | No
 def _write_stability(scenario: Scenario, found: Stability, out: Path) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
-        draw_stability(scenario, found, out / "stability.png")
+        with left_out_if_missing("stability.png"):
+            from hil.figures.stability_figures import draw_stability
+
+            draw_stability(scenario, found, out / "stability.png")
     except OSError as error:
         raise UsageError(f"{out}: cannot be written ({error.strerror}); choose another --out") from error
 

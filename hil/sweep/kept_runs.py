@@ -27,9 +27,9 @@ def keep_run(sweep: Sweep, folder: Path, cell: int, run: int) -> Path:
 def kept_runs(sweep: Sweep, folder: Path) -> list[dict[str, str]]:
     """Per cell the names of the folders of its runs that were kept, by the run's number."""
     found: list[dict[str, str]] = [{} for _ in sweep.cells()]
-    for report in folder.glob("cell-*-run-*/report.html"):
-        _, cell, _, run = report.parent.name.split("-")
-        found[int(cell)][run] = report.parent.name
+    for summary in folder.glob("cell-*-run-*/summary.json"):
+        _, cell, _, run = summary.parent.name.split("-")
+        found[int(cell)][run] = summary.parent.name
     return [dict(sorted(each.items(), key=lambda item: int(item[0]))) for each in found]
 
 

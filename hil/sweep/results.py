@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hil import __version__
+from hil.extras import left_out_if_missing
 from hil.log.report_json import write_json
 from hil.log.written_aside import write_text_aside, written_aside
 from hil.sweep.cell_report import report_cell
@@ -56,16 +57,21 @@ def fly_sweep(
 
 
 def write_results(sweep: Sweep, result: dict[str, Any], folder: Path) -> None:
-    """Write ``results.json``, ``results.parquet`` and ``report.html``; cells tell of their ``kept`` runs."""
-    from hil.reports.sweep_report import sweep_report
+    """Write ``results.json``, ``results.parquet`` and ``report.html``; cells tell of their ``kept`` runs.
 
-    write_table(result["cells"], folder / "results.parquet")
+    Those whose extras are missing are left out, and that is said on stderr.
+    """
+    with left_out_if_missing("results.parquet"):
+        write_table(result["cells"], folder / "results.parquet")
     for cell, kept in zip(result["cells"], kept_runs(sweep, folder), strict=True):
         if kept:
             cell["kept"] = kept
     told = {"version": __version__, "spec": spec_json(sweep.spec), **result}
     write_json(told, folder / "results.json")
-    write_text_aside(folder / "report.html", sweep_report(result))
+    with left_out_if_missing("report.html"):
+        from hil.reports.sweep_report import sweep_report
+
+        write_text_aside(folder / "report.html", sweep_report(result))
 
 
 def write_table(cells: list[dict[str, Any]], path: Path) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.errors import CheckFailedError, UsageError
+from hil.extras import needs_extra
 from hil.sweep.spec import Sweep
 from hil.sweep.work import Piece, fly_piece
 
@@ -71,10 +72,8 @@ def fly_on_cluster(sweep: Sweep, pieces: Sequence[Piece], scheduler: str) -> Ite
     """
     try:
         distributed: Any = importlib.import_module("distributed")
-    except ImportError:
-        raise UsageError(
-            f"--scheduler {scheduler}: needs Dask, which is not installed; pip install 'abreast[cluster]'"
-        ) from None
+    except ModuleNotFoundError as error:
+        raise needs_extra(f"--scheduler {scheduler}", error) from None
     try:
         client = distributed.Client(scheduler, timeout=_CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
