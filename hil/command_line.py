@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 
@@ -11,6 +12,9 @@ import click
 
 from formation.collector import collector_paused
 from hil import __version__
+from hil.commands.command_group import CommandGroup
+from hil.commands.command_help import names_text, usage_mistake
+from hil.commands.completed import complete_by_name
 from hil.errors import AbreastError, UsageError
 from hil.extras import is_left_out, needs_extra
 
@@ -39,6 +43,8 @@ COMMANDS = {
     "leader": "what drives a real leader by its program, as a daemon",
     "recorder": "the recorder, as a daemon",
     "router": "the router that all others connect to, on its own, as a daemon",
+    "scenario": "scenarios: list them, show one as it is resolved, begin one of your own",
+    "completion": "what lets bash, zsh or fish complete commands, options, names and keys",
     "faults": "faults put into live runs on purpose, and whether robots stand for them",
     "soak": "a long live run: whether memory stays flat, cycles on time, and its log repeats",
     "secure": "keys by which a router knows who is who, and what each may do",
@@ -47,11 +53,27 @@ COMMANDS = {
 _OF_NAMES = (errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.EACCES)
 """What is wrong with a name that was given, and not with the machine."""
 
+GROUPS = {
+    "Drive": ("run", "live", "doctor", "status", "stop", "arm"),
+    "Look back": ("replay", "compare", "export", "import", "recover"),
+    "Judge and design": ("bounds", "gains", "simulate", "sweep", "calibrate", "scenario"),
+    "Try a lab": ("soak", "faults"),
+    "Set up a lab": ("secure", "completion"),
+    "Daemons": (
+        *("router", "bridge", "guard", "emulator", "follower", "estimator", "controller", "leader"),
+        "recorder",
+    ),
+}
+"""Commands by what they are for, as help shows them."""
+
+_COMPLETES = "_ABREAST_COMPLETE"
+"""By this variable a shell asks for completions instead."""
+
 _MODULES = {"import": "import_recording"}
 _DAEMONS = ("emulator", "follower", "estimator", "controller", "leader", "recorder")
 
 
-class _LazyGroup(click.Group):
+class _LazyGroup(CommandGroup):
     """Imports a command's module only when that command is called, so that each starts fast."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -61,17 +83,37 @@ class _LazyGroup(click.Group):
         if cmd_name not in COMMANDS:
             return None
         with collector_paused():
-            if cmd_name in _DAEMONS:
-                from hil.commands.daemon import daemon_command
-
-                return daemon_command(cmd_name, COMMANDS[cmd_name])
-            module = importlib.import_module(f"hil.commands.{_MODULES.get(cmd_name, cmd_name)}")
-            command: click.Command = module.command
-            return command
+            command = _loaded(cmd_name)
+        complete_by_name(command)
+        for each in getattr(command, "commands", {}).values():
+            complete_by_name(each)
+        return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+        grouped = {name for names in GROUPS.values() for name in names}
+        others = {"Others": tuple(name for name in COMMANDS if name not in grouped)}
+        for title, names in (GROUPS | others).items():
+            if rows := [(name, COMMANDS[name]) for name in names if name in COMMANDS]:
+                with formatter.section(title):
+                    formatter.write_dl(rows, col_spacing=2)
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        formatter.write_paragraph()
+        for line in names_text(("scenario", "law", "estimator")).splitlines():
+            formatter.write(f"{line}\n")
+        formatter.write_paragraph()
+        formatter.write("abreast COMMAND --help tells more of a command, with examples.\n")
+
+
+def _loaded(name: str) -> click.Command:
+    """A command, from its module."""
+    if name in _DAEMONS:
+        from hil.commands.daemon import daemon_command
+
+        return daemon_command(name, COMMANDS[name])
+    module = importlib.import_module(f"hil.commands.{_MODULES.get(name, name)}")
+    command: click.Command = module.command
+    return command
 
 
 @click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
@@ -85,10 +127,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         _refuse_no_text(given)
+        if _COMPLETES in os.environ:
+            importlib.import_module("hil.commands.completion")
         code = abreast.main(args=given, prog_name="abreast", standalone_mode=False)
     except click.UsageError as error:
         where = error.ctx.command_path if error.ctx else "abreast"
-        _say(f"{where}: {error.format_message()} (see `{where} --help`)")
+        _say(f"{where}: {usage_mistake(error)} (see `{where} --help`)")
         code = 2
     except click.ClickException as error:
         _say(f"abreast: {error.format_message()}")

@@ -10,6 +10,7 @@ import click
 
 from formation.collector import collector_paused
 from hil.bridge.seen_frame import Up
+from hil.commands.command_group import CommandGroup
 from hil.commands.seconds import DURATION
 from hil.commands.wire_options import endpoints_of, wire_options
 from hil.log.report_json import note
@@ -36,7 +37,7 @@ class _Given(TypedDict):
     tethered: bool
 
 
-@click.group("bridge")
+@click.group("bridge", cls=CommandGroup)
 def command() -> None:
     """Bring what other systems send to the wire."""
 

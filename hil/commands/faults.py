@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hil.commands.outputs import OutputFolder
+from hil.commands.whole_numbers import Whole
 from hil.errors import CheckFailedError, UsageError
 from hil.log.report_json import note, print_json, print_text, results_apart
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 @click.option(
     "--only", multiple=True, metavar="NAME", help="A fault, or all that begin so; may be given again."
 )
-@click.option("--tries", type=click.IntRange(min=1), default=1, show_default=True, metavar="N")
+@click.option("--tries", type=Whole(1), default=1, show_default=True, metavar="N")
 @click.option("--list", "as_list", is_flag=True, help="Print the names of all faults, and end.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object on stdout.")
 @click.option(

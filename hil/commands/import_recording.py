@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Literal, TypeVar
 
 import click
 
+from hil.commands.command_group import CommandGroup
 from hil.commands.outputs import OutputFile, refuse_unwritable
+from hil.commands.whole_numbers import Whole
 from hil.errors import AbreastError, UsageError
 from hil.log.report_json import note, say
 
@@ -20,7 +22,7 @@ _SHOWN = 5
 Callback = TypeVar("Callback", bound=Callable[..., None])
 
 
-@click.group("import")
+@click.group("import", cls=CommandGroup)
 def command() -> None:
     """Turn a recording that is not a log into one, for replay."""
 
@@ -117,8 +119,8 @@ def _tell(recording: str, log: Path, done: Imported) -> None:
 
 @command.command("mrclam")
 @click.argument("folder", type=click.Path(path_type=Path))
-@click.option("--leader", required=True, type=int, metavar="N", help="Number of the robot that leads.")
-@click.option("--follower", required=True, type=int, metavar="N", help="Number of the robot that follows.")
+@click.option("--leader", required=True, type=Whole(1), metavar="N", help="Number of the robot that leads.")
+@click.option("--follower", required=True, type=Whole(1), metavar="N", help="Number of the one that follows.")
 @click.option("--out", required=True, type=OutputFile(), metavar="LOG", help="The log to write.")
 @click.option(
     "--sightings",

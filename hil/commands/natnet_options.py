@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 import click
 
+from hil.commands.whole_numbers import Whole
 from hil.errors import UsageError
 
 if TYPE_CHECKING:
     from hil.bridge.natnet_emulator import NatNetEmulator, Serving
 
-_PORT = click.IntRange(0, 65_535)
+_PORT = Whole(0, 65_535)
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,9 +16,9 @@ from hil.commands.outputs import OutputFolder, new_folder
 from hil.commands.own_parts import load_own_parts
 from hil.commands.page_options import PagePlace, page_options, page_place, shown_page
 from hil.commands.seconds import DURATION, Seconds
+from hil.commands.whole_numbers import Whole
 from hil.errors import AbreastError, CheckFailedError, InterruptedRunError, UsageError
 from hil.extras import why_interpreted
-from hil.judge.made_by import law_failure
 from hil.live.crew import Crew
 from hil.log.report_json import note, print_json, results_apart, say
 from hil.reports.judged_log import claimed, judge_log, made_folder, results_in
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 @click.command("run", params=page_options())
 @click.argument("scenario", default="turtlebot3")
 @click.option("--duration", type=DURATION, metavar="S", help="Seconds from the leader's start to the stop.")
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all noise.")
+@click.option("--seed", type=Whole(0), metavar="N", help="Seed of all noise.")
 @click.option("--estimator", metavar="E", help="Estimator: ekf, ukf, imm, or file.py:factory.")
 @click.option("--law", metavar="L", help="Law of the follower: independent, or file.py:function.")
 @click.option("--out", type=OutputFolder(), metavar="DIR", help="Folder for results.")
@@ -195,6 +195,7 @@ def _how(
 
 
 def _run(chosen: Scenario, folder: Path, live: _Live | None, *, as_json: bool) -> None:
+    from hil.judge.made_by import law_failure
     from hil.log.rotating_log import log_place, pieces_of
 
     named = folder / "run.mcap"

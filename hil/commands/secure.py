@@ -7,12 +7,14 @@ from pathlib import Path
 
 import click
 
+from hil.commands.command_group import CommandGroup
 from hil.commands.guard_option import NO_GUARD
+from hil.commands.whole_numbers import Whole
 from hil.extras import needs_extra
 from hil.log.report_json import say
 
 
-@click.group("secure")
+@click.group("secure", cls=CommandGroup)
 def command() -> None:
     """Make the keys of a lab, which all commands take by --secure DIR."""
 
@@ -24,9 +26,7 @@ def command() -> None:
     "--host", "hosts", multiple=True, metavar="NAME", help="Where the router is reached; may be given again."
 )
 @click.option("--no-guard", is_flag=True, help=NO_GUARD)
-@click.option(
-    "--days", type=click.IntRange(1, 3650), default=825, show_default=True, help="How long they are valid."
-)
+@click.option("--days", type=Whole(1, 3650), default=825, show_default=True, help="How long they are valid.")
 @click.option("--force", is_flag=True, help="Make all anew; nobody gets in by the old ones then.")
 @click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key of the scenario."

@@ -13,7 +13,6 @@ from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
 from hil.live.interrupts import interrupt_on_signals
 from hil.log.report_json import note, print_json, print_text, results_apart, write_json
-from hil.log.rotating_log import log_place
 from hil.scenario.files import load_scenario, refuse_unrunnable
 
 _HOUR_S = 3600.0
@@ -41,6 +40,7 @@ def command(
     five minutes (told from 15 minutes on), more than one of 10,000 cycles is late by a period of the motion
     capture, or a replay of the log differs.
     """
+    from hil.log.rotating_log import log_place
     from hil.soak.verdict import as_result
     from hil.soak.verified_log import verified_log
     from hil.soak.watched_run import watched_run

@@ -12,6 +12,7 @@ import click
 from hil.commands.outputs import OutputFolder, new_folder
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import Seconds
+from hil.commands.whole_numbers import Whole
 from hil.errors import CheckFailedError, UsageError
 from hil.extras import why_interpreted
 from hil.log.report_json import note, print_json, results_apart, say
@@ -21,8 +22,8 @@ from hil.sweep.spec import Sweep, load_sweep
 
 @click.command("sweep")
 @click.argument("spec", default="default")
-@click.option("--runs", type=click.IntRange(min=1), metavar="N", help="Runs of every cell.")
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all noise.")
+@click.option("--runs", type=Whole(1), metavar="N", help="Runs of every cell.")
+@click.option("--seed", type=Whole(0), metavar="N", help="Seed of all noise.")
 @click.option("--duration", type=Seconds(1.0), metavar="S", help="Seconds of every run.")
 @click.option(
     "--estimators", metavar="A,B", help="Estimators, any that a scenario takes, file.py:factory too."
@@ -31,9 +32,7 @@ from hil.sweep.spec import Sweep, load_sweep
 @click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key in all cells."
 )
-@click.option(
-    "--workers", type=click.IntRange(min=1), metavar="N", help="Processes [as many as there are processors]."
-)
+@click.option("--workers", type=Whole(1), metavar="N", help="Processes [as many as there are processors].")
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Dask scheduler to send the work to, like tcp://host:8786."
 )

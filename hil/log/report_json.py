@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
 import click
-import numpy as np
 
 from hil.log.written_aside import write_text_aside
 
@@ -34,12 +33,11 @@ def known(value: Any) -> Any:
     if isinstance(value, Mapping):
         kept = {str(key): known(item) for key, item in value.items()}
         return {key: item for key, item in kept.items() if item is not None and item != {}}
-    if isinstance(value, np.ndarray):
+    if hasattr(value, "tolist"):
+        # An array or a number of numpy, which the command line loads for its results only.
         return known(value.tolist())
     if isinstance(value, Sequence) and not isinstance(value, str):
         return [known(item) for item in value]
-    if isinstance(value, np.generic):
-        return known(value.item())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

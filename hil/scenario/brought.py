@@ -11,6 +11,7 @@ from controllers.own_law import OwnLaw
 from hil.errors import UsageError
 from hil.extensions import estimators, laws
 from hil.extensions.reference import is_reference, settled
+from hil.scenario.checked_toml import meant
 from hil.scenario.schema import ESTIMATOR_NAMES, LAW_NAMES, Scenario
 
 
@@ -53,7 +54,7 @@ def refuse_unknown(scenario: Scenario, source: str) -> None:
         if text not in place.known and not is_reference(text):
             raise UsageError(
                 f"{source}: {place.section}.{place.key} is {text!r}: expected one of "
-                f"{', '.join(map(repr, place.known))}, or {place.like}"
+                f"{', '.join(map(repr, place.known))}, or {place.like}{meant(text, place.known)}"
             )
     if not is_reference(scenario.controller.law) and parameters_of(scenario):
         raise UsageError(

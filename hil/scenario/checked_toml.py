@@ -50,8 +50,7 @@ def locate(noun: str, folder: str, name_or_path: str) -> Path:
             if path.is_file():
                 return path
     names = shipped_names(folder)
-    near = difflib.get_close_matches(name_or_path, names, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else f"; give a TOML file or one of: {', '.join(names)}"
+    hint = meant(name_or_path, names) or f"; give a TOML file or one of: {', '.join(names)}"
     raise UsageError(f"{noun} {name_or_path!r}: no such name and no such file{hint}")
 
 
@@ -86,6 +85,12 @@ def nearest(word: str, known: Iterable[str]) -> str:
     names = list(known)
     near = difflib.get_close_matches(word, names, n=1, cutoff=0.4)
     return f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(names)}"
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    """``; did you mean 'this'?``, or nothing where no known word is near."""
+    near = difflib.get_close_matches(word, list(known), n=1)
+    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def _refuse_above(largest: float, node: object, source: str, path: str) -> None:
@@ -131,7 +136,8 @@ def _explain(error: str, tree: Mapping[str, Any], kind: type[msgspec.Struct]) ->
     what = what.replace("expected object, got", "expected a section, got")
     allowed = _allowed(path, tree, kind) if what.startswith("Invalid") else []
     if allowed:
-        what = f"expected one of {', '.join(map(repr, allowed))}"
+        near = meant(value, map(str, allowed)) if isinstance(value, str) else ""
+        what = f"expected one of {', '.join(map(repr, allowed))}{near}"
     shown = f" is {value!r}:" if path and not isinstance(value, Mapping) and value is not None else ":"
     return f"{path or 'top level'}{shown} {what}"
 
@@ -150,7 +156,7 @@ def _allowed(path: str, tree: Mapping[str, Any], kind: type[msgspec.Struct]) -> 
     _, options = _walk(section, tree, kind)
     tags = [o.__struct_config__.tag for o in options if o.__struct_config__.tag_field == key]
     fields = [field for option in options for field in msgspec.structs.fields(option) if field.name == key]
-    return [*tags] or [value for field in fields for value in _literals(field.type)]
+    return [*tags] or [value for field in fields for value in literals(field.type)]
 
 
 def _walk(
@@ -163,7 +169,7 @@ def _walk(
         node = _below(node, step)
         fields = [field for option in options for field in msgspec.structs.fields(option)]
         types = [field.type for field in fields if field.name == step.partition("[")[0]]
-        options = [option for given in types for option in (given, *get_args(given)) if _is_section(option)]
+        options = [option for given in types for option in (given, *get_args(given)) if is_section(option)]
     return node, options
 
 
@@ -177,12 +183,13 @@ def _below(node: object, step: str) -> Any:
     return value
 
 
-def _is_section(kind: object) -> TypeGuard[type[msgspec.Struct]]:
+def is_section(kind: object) -> TypeGuard[type[msgspec.Struct]]:
+    """Whether a type is that of a section."""
     return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
 
 
-def _literals(kind: Any) -> list[object]:
+def literals(kind: Any) -> list[object]:
     """Values of a Literal, or of the Literals in a union."""
     if get_origin(kind) is Literal:
         return list(get_args(kind))
-    return [value for option in get_args(kind) for value in _literals(option)]
+    return [value for option in get_args(kind) for value in literals(option)]

@@ -157,11 +157,18 @@ def with_overrides(scenario: Scenario, *overrides: Overrides) -> Scenario:
 
 
 def _overlaid(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    """Tree with the upper one's values where it has any; a section with a ``kind`` replaces the lower's."""
+    """Tree with the upper one's values where it has any; what is of another ``kind`` replaces the lower's.
+
+    An estimator's kind is one of its keys: the others are the same for all.
+    """
     result = dict(below)
     for key, value in above.items():
         under = result.get(key)
-        if isinstance(value, Mapping) and isinstance(under, Mapping) and "kind" not in value:
+        if (
+            isinstance(value, Mapping)
+            and isinstance(under, Mapping)
+            and ("kind" not in value or key == "estimator")
+        ):
             result[key] = _overlaid(under, value)
         else:
             result[key] = value

@@ -18,7 +18,7 @@ from hil import __version__
 from hil.errors import UsageError
 from hil.extensions.reference import found, is_reference, short
 from hil.scenario.brought import settled_references
-from hil.scenario.checked_toml import checked, locate, read_toml
+from hil.scenario.checked_toml import checked, locate, meant, read_toml
 from hil.scenario.files import load_scenario, with_overrides
 from hil.scenario.schema import Scenario
 from hil.scenario.section import Deviation, Probability, Span
@@ -157,7 +157,7 @@ def load_sweep(given: str | Mapping[str, Any], overrides: Sequence[str] = (), **
         if estimator not in ESTIMATORS and not is_reference(estimator):
             raise UsageError(
                 f"{source}: estimators has {estimator!r}, expected some of: "
-                f"{', '.join(ESTIMATORS)}, or file.py:factory"
+                f"{', '.join(ESTIMATORS)}, or file.py:factory{meant(estimator, ESTIMATORS)}"
             )
     scenario = load_scenario(spec.scenario, [*spec.set, f"run.duration_s={spec.duration_s!r}"])
     sweep = Sweep(spec, scenario)
