@@ -17,13 +17,14 @@ from abreast._scenarios import Own, ScenarioLike, scenario_of, text_of
 from estimation.bounds.certificate import Certificate
 from formation.angles import FloatArray
 from hil.errors import UsageError
+from hil.log.report_json import flat
 from hil.replay.lab_calibration import Calibration, calibration_of
 from hil.scenario.certificate import certificate_of
 from hil.scenario.files import Overrides, override_texts
 from hil.simulate.experiments import experiment
 from hil.simulate.gain_proposal import GainProposal, propose
 from hil.simulate.simulation import Simulation
-from hil.sweep.results import flat, fly_sweep, write_results
+from hil.sweep.results import fly_sweep, write_results
 from hil.sweep.spec import load_sweep
 
 

@@ -35,17 +35,22 @@ class OutputFolder(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The path; raises :class:`UsageError` where no folder can be."""
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
-        option, nearest = _option(param), path
-        try:
-            while not nearest.exists() and nearest != nearest.parent:
-                nearest = nearest.parent
-        except OSError as error:
-            raise UsageError(f"{option} {path}: {error.strerror}; give another folder") from None
-        if not nearest.is_dir():
-            raise UsageError(f"{option} {path}: cannot be made ({nearest} is a file); give another folder")
-        if not os.access(nearest, os.W_OK | os.X_OK):
-            raise UsageError(f"{option} {path}: may not be written to; give another folder")
+        refuse_no_folder(path, _option(param))
         return path
+
+
+def refuse_no_folder(path: Path, option: str) -> None:
+    """Raise :class:`UsageError` where no folder for results can be; ``option``: what gave it."""
+    nearest = path
+    try:
+        while not nearest.exists() and nearest != nearest.parent:
+            nearest = nearest.parent
+    except OSError as error:
+        raise UsageError(f"{option} {path}: {error.strerror}; give another folder") from None
+    if not nearest.is_dir():
+        raise UsageError(f"{option} {path}: cannot be made ({nearest} is a file); give another folder")
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        raise UsageError(f"{option} {path}: may not be written to; give another folder")
 
 
 def refuse_unwritable(path: Path, option: str) -> None:

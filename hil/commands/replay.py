@@ -9,6 +9,7 @@ import click
 
 from formation.collector import collector_paused
 from hil.commands.outputs import OutputFile, OutputFolder
+from hil.commands.replay_folder import refuse_for_folder, replay_folder
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
 from hil.extras import why_interpreted
@@ -42,6 +43,13 @@ if TYPE_CHECKING:
     "--strict", is_flag=True, help="Fail if an error lies outside its extended bound or certified radius."
 )
 @click.option("--certify", is_flag=True, help="Judge a guaranteed error radius of every estimate too.")
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes for a folder of logs [all].",
+)
+@click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler for a folder of logs.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object on stdout.")
 @results_apart()
 @collector_paused()
@@ -61,18 +69,28 @@ def command(
     out: Path | None,
     strict: bool,
     certify: bool,
+    workers: int | None,
+    scheduler: str | None,
     as_json: bool,
 ) -> None:
     """Run LOG through the very steps that run live, and judge what comes out.
 
+    Of a folder of logs each is judged, and the worst are named: into LOG-out, if there is no --out.
+
     --from and --to are seconds since the leader set off, for imported recordings the source's own time; the
     steps always begin where the log does.
     """
+    from hil.log.log_folder import is_folder_of_logs
     from hil.log.opened import opened_log
 
+    many = is_folder_of_logs(log)
+    if not many and (workers or scheduler):
+        raise UsageError(f"log {log}: is a single log; --workers and --scheduler are for a folder of logs")
     # First of all: what replays takes over a second to load, and to compile where that is still to be done.
-    given = opened_log(log)
-    if propose:
+    if many:
+        refuse_for_folder(log, {"--csv": table, "--propose-map": propose})
+    given = None if many else opened_log(log)
+    if given is not None and propose:
         from hil.replay.proposed_map import proposed_map
 
         print_text(proposed_map(given, leader, follower))
@@ -96,6 +114,9 @@ def command(
         verify=verify,
         certify=certify,
     )
+    if given is None:
+        replay_folder(log, choice, out, workers=workers, scheduler=scheduler, strict=strict, as_json=as_json)
+        return
     if (chain := chain_in(given, choice)) is not None:
         from hil.commands.chain_results import leave_replay
 

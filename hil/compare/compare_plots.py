@@ -9,8 +9,9 @@ import numpy as np
 
 from hil.compare.comparison import Comparison
 from hil.compare.courses import Course
-from hil.compare.metrics import HEADLINES, bare, unit_of
-from hil.reports.colours import BLUE, PURPLE, VERMILION
+from hil.compare.metrics import HEADLINES, unit_of
+from hil.judge.dotted_figures import bare
+from hil.reports.colours import BLUE, GREY, PURPLE, VERMILION
 from hil.reports.plot_models import Field, Model, Value, source_of
 from hil.reports.plots import (
     Key,
@@ -23,7 +24,7 @@ from hil.reports.plots import (
     table,
 )
 
-LOOKS = ((BLUE, "solid"), (VERMILION, "dashed"), (PURPLE, "dotted"), ("#007a5a", "solid"))
+LOOKS = ((BLUE, "solid"), (VERMILION, "dashed"), (PURPLE, "dotted"), (GREY, "solid"))
 """Colour and dash of each group's lines, in turn."""
 
 _COURSES = (

@@ -12,10 +12,11 @@ import numpy as np
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray, wrap
 from hil.compare.group import Group, Sample
-from hil.compare.metrics import HEADLINES, bare
+from hil.compare.metrics import HEADLINES
 from hil.errors import AbreastError
 from hil.figures.plot_data import broken_at_jumps
 from hil.judge.columns import Columns, columns_of, inside
+from hil.judge.dotted_figures import bare
 from hil.judge.estimation import errors_at
 from hil.judge.run_data import RunData, run_data_of_link, run_data_of_log
 from hil.judge.true_states import Stamps

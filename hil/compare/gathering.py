@@ -19,8 +19,8 @@ from hil.log.description import RECORD
 from hil.log.log_folder import logs_in
 from hil.log.opened import opened_log
 from hil.log.reader import Log
+from hil.log.report_json import flat
 from hil.reports.sweep_cells import is_known, point_of
-from hil.sweep.results import flat
 
 _EXPECTED = (
     "expected the folder of a run (summary.json), of a sweep or of judged logs (results.json), of many "

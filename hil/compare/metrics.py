@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 
+from hil.judge.dotted_figures import HEADLINES as RUN_HEADLINES
+from hil.judge.dotted_figures import bare, figures_of
 from hil.reports.run_tables import QUANTITIES, scale_of
-from hil.sweep.results import flat
 
 LOWER, HIGHER, NEAR = "lower", "higher", "near"
 
@@ -79,9 +80,7 @@ _GOALS = {
 """Those of summaries, then those of a sweep's cells; of a metric that is not here nobody can say."""
 
 HEADLINES = {
-    "estimation.rmse.v1": "RMSE of v1",
-    "estimation.rmse.alpha1": "RMSE of alpha1",
-    "formation.orbit_deviation_rms.rho": "rho off the noise-free run",
+    **RUN_HEADLINES,
     "rmse.v1": "RMSE of v1",
     "rmse.alpha1": "RMSE of alpha1",
     "formation.deviation.rho": "rho off the noise-free run",
@@ -142,28 +141,8 @@ _NO_METRICS = (
 
 
 def metrics_of(tree: Mapping[str, Any]) -> dict[str, float]:
-    """Metrics of a summary or a cell by dotted names, numbers only; those of a chain's pairs by the follower.
-
-    ``findings``: how many there are.
-    """
-    named = dict(tree)
-    if isinstance(pairs := named.pop("pairs", None), list):
-        named |= {f"pairs.{pair['follower']}": _counted(pair) for pair in pairs}
-    return {
-        name: float(value)
-        for name, value in flat(_counted(named))
-        if isinstance(value, (int, float)) and math.isfinite(value) and _is_metric(name)
-    }
-
-
-def _counted(tree: Mapping[str, Any]) -> dict[str, Any]:
-    found = tree.get("findings")
-    return {**tree, "findings": len(found)} if isinstance(found, list) else dict(tree)
-
-
-def bare(name: str) -> str:
-    """A metric's name without the pair of a chain in front."""
-    return name.split(".", 2)[2] if name.startswith("pairs.") and name.count(".") > 1 else name
+    """Metrics of a summary or a cell by dotted names: its figures but for what are conditions."""
+    return {name: value for name, value in figures_of(tree).items() if _is_metric(name)}
 
 
 def _is_metric(name: str) -> bool:

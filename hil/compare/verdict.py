@@ -9,7 +9,8 @@ from fnmatch import fnmatchcase
 
 from hil.compare.change import Change, change_of
 from hil.compare.group import Group, Spread
-from hil.compare.metrics import BROKEN, HEADLINES, UNTRACKED, bare, in_order, shown, unit_of
+from hil.compare.metrics import BROKEN, HEADLINES, UNTRACKED, in_order, shown, unit_of
+from hil.judge.dotted_figures import bare
 
 _NEGLIGIBLE = 0.02
 """Share by which errors must differ to be worth a word."""

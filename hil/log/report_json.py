@@ -43,6 +43,15 @@ def known(value: Any) -> Any:
     return value
 
 
+def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Values with their names; what is nested gets names like ``rmse.v1``."""
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
 def as_json(result: Mapping[str, Any], indent: int | None = None) -> str:
     """JSON text of a result."""
     return json.dumps(known(result), indent=indent, allow_nan=False)

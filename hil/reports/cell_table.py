@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from urllib.parse import quote
 
-from hil.reports.scroll_frame import framed
+from hil.reports.scroll_frame import framed_rows
 from hil.reports.sweep_cells import Cell, is_known, number
 
 _HEADER = ("cell", "runs", "diverged", "v₁ [mm/s]", "α₁ [deg]", "error / bound", "ρ [m]", "a closer look")
@@ -17,12 +17,8 @@ def cell_table(
     caption: str, cells: Sequence[Cell], places: Sequence[int], names: Sequence[str], *, anchors: bool
 ) -> str:
     """Rows of the cells at these places. ``anchors``: whether it is these rows that maps lead to."""
-    head = "".join(f'<th scope="col">{escape(each)}</th>' for each in _HEADER)
-    rows = "\n".join(_row(cells[place], place, names[place], anchors=anchors) for place in places)
-    return framed(
-        f'<div class="wide"><table class="many"><caption>{escape(caption)}</caption>\n'
-        f"<thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table></div>"
-    )
+    rows = [_row(cells[place], place, names[place], anchors=anchors) for place in places]
+    return framed_rows(caption, _HEADER, rows)
 
 
 def address_of(cell: Cell, place: int) -> str:

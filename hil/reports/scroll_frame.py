@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from html import escape
 
 SCROLL_STYLE = """<style>
 .scrolls { position: relative; } .scrolls > .wide { border: 1px solid var(--line); border-radius: .3rem;
@@ -36,3 +38,13 @@ def framed(table: str) -> str:
     inner = bare.replace(_PLAIN, f'<div class="wide" tabindex="0" role="region" aria-label="{caption}">', 1)
     above = f'<p class="soft">{caption}</p>' if found else ""
     return f'<div class="scrolls">{above}{inner}</div>'
+
+
+def framed_rows(caption: str, header: Sequence[str], rows: Sequence[str]) -> str:
+    """A framed table of rows that are ready HTML, as some hold links; empty without any."""
+    if not rows:
+        return ""
+    head = "".join(f'<th scope="col">{escape(each)}</th>' for each in header)
+    title = f"<caption>{escape(caption)}</caption>" if caption else ""
+    body = f"<thead><tr>{head}</tr></thead>\n<tbody>{''.join(rows)}</tbody>"
+    return framed(f'{_PLAIN}<table class="many">{title}{body}</table></div>')

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from hil import __version__
 from hil.extras import left_out_if_missing
-from hil.log.report_json import write_json
+from hil.log.report_json import flat, write_json
 from hil.log.written_aside import write_text_aside, written_aside
 from hil.sweep.cell_report import report_cell
 from hil.sweep.kept_runs import kept_runs
@@ -74,22 +74,13 @@ def write_results(sweep: Sweep, result: dict[str, Any], folder: Path) -> None:
         write_text_aside(folder / "report.html", sweep_report(result))
 
 
-def write_table(cells: list[dict[str, Any]], path: Path) -> None:
-    """Write one row for each cell; what is nested gets names like ``rmse.v1``."""
+def write_table(trees: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """Write one row for each cell, or each of what else; what is nested gets names like ``rmse.v1``."""
     import pyarrow
     from pyarrow import parquet
 
-    rows = [dict(flat(cell)) for cell in cells]
+    rows = [dict(flat(tree)) for tree in trees]
     names = list(dict.fromkeys(name for row in rows for name in row))
     table = pyarrow.table({name: [row.get(name) for row in rows] for name in names})
     with written_aside(path) as aside:
         parquet.write_table(table, aside)
-
-
-def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Values with their names; what is nested gets names like ``rmse.v1``."""
-    for key, value in tree.items():
-        if isinstance(value, Mapping):
-            yield from flat(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value
