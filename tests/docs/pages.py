@@ -77,7 +77,8 @@ def command_of(root: click.Group, words: list[str]) -> tuple[click.Context, list
 
     Raises :class:`KeyError` for a name that is no command.
     """
-    context, left, command = click.Context(root, info_name="abreast"), list(words), root
+    context, left = click.Context(root, info_name="abreast"), list(words)
+    command: click.Command = root
     while isinstance(command, click.Group) and left and not left[0].startswith("-"):
         inner = command.get_command(context, left[0])
         if inner is None:

@@ -1,4 +1,4 @@
-"""Every command of the docs is one: its options are read, and where no lab is needed it is run as it stands."""
+"""Every command of the docs is one: its options are read; where no lab is needed it is run as it stands."""
 
 from __future__ import annotations
 

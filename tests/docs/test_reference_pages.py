@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from hil.command_line import main
-from hil.replay.estimate_csv import FIELDS
+from hil.replay.estimate_columns import ESTIMATE_COLUMNS
 from hil.wire.message_types import OWN_TYPES
 from hil.wire.messages import typename_of
 from hil.wire.topics import Topics
@@ -74,7 +74,7 @@ def test_every_message_of_our_own_stands_there() -> None:
 
 
 def test_the_columns_of_estimates_stand_in_their_order() -> None:
-    assert [name for row in rows(SUMMARY, "column") for name in names(row[0])] == list(FIELDS)
+    assert [name for row in rows(SUMMARY, "column") for name in names(row[0])] == list(ESTIMATE_COLUMNS)
 
 
 def paths(value: Any, at: str = "") -> Iterator[str]:
