@@ -14,10 +14,9 @@ from hil.wire.message_types import String
 from hil.wire.messages import encode
 from hil.wire.pubsub import Wire
 
-TIMES = 5
-"""How often a stop is said."""
+TIMES, REPEAT_S = 5, 0.1
+"""How often a stop is said, and how long after each other [s]."""
 
-_REPEAT_S = 0.1
 _PATIENCE_S = 2.0
 _LOOK_S = 0.3
 
@@ -78,7 +77,7 @@ def stop_all(wire: Wire, scenario: Scenario, reason: str) -> Stopped:
     wire.subscribe(state.robot_topics, shown=False, ours=False)
     for _ in range(TIMES):
         say_stop(wire, scenario, reason)
-        hear_for(state, wire.inbox.take, clock, clock() + _REPEAT_S)
+        hear_for(state, wire.inbox.take, clock, clock() + REPEAT_S)
     until = clock() + _PATIENCE_S
     while ((driven := state.driven(clock())) or state.unheard()) and clock() < until:
         hear_for(state, wire.inbox.take, clock, clock() + _LOOK_S)

@@ -3,7 +3,8 @@
 import { SPAN_S, round, sized, stroke } from "./strips.js";
 
 const BODY = 0.069; // [m] a TurtleBot3 Burger
-const AHEAD_S = 1;
+const AHEAD_S = 2; // as the server carries the belief on
+const BELIEVED = ["tracking", "coasting", "rejecting"];
 
 export class Arena {
   constructor(canvas) {
@@ -47,7 +48,7 @@ export class Arena {
     frame.robots.forEach((robot, k) => {
       if (robot.pose) body(brush, at, scale, robot.pose, stale(k) ? ink.soft : k ? ink.follower : ink.leader, ink.paper);
     });
-    if (frame.estimate?.leader) belief(brush, at, scale, frame, ink);
+    if (frame.estimate?.leader && BELIEVED.includes(frame.estimate.status)) belief(brush, at, scale, frame, ink);
   }
 
   // What is to be in the picture: all tracks, in a frame that grows at once and shrinks slowly.
@@ -121,7 +122,8 @@ function belief(brush, at, scale, frame, ink) {
   if ([x, y, theta, v1].includes(null)) return;
   ring(brush, at(x, y), Math.max(BODY * scale, 7) + 3, ink.leader);
   const tip = [x + v1 * AHEAD_S * Math.cos(theta), y + v1 * AHEAD_S * Math.sin(theta)];
-  stroke(brush, ink.leader, 2, [], [at(x, y), at(...tip)]);
+  stroke(brush, ink.paper, 5, [], [at(x, y), at(...tip)]);
+  stroke(brush, ink.leader, 2.5, [], [at(x, y), at(...tip)]);
   if (ellipse && !ellipse.includes(null)) {
     const [major, minor, angle] = ellipse;
     brush.strokeStyle = ink.leader;

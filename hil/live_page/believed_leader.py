@@ -8,7 +8,7 @@ from typing import NamedTuple
 from formation.pose import Pose
 from formation.wrapping import wrapped
 
-AHEAD_S = 1.0
+AHEAD_S = 2.0
 """How far the belief is carried on [s] to be drawn."""
 
 DEVIATIONS = 3.0

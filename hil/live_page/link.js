@@ -1,6 +1,7 @@
 // The way to the server: one websocket that is made anew whenever it is gone, and a POST beside it for orders.
 
 const AGAIN_MS = 700, QUIET_MS = 3000, ANSWER_MS = 150, POST_MS = 2000;
+const OVER = "the run is over, or the page was ended";
 
 export class Link {
   // heard: called with every message of the server; changed: with whether there is a link, and why not.
@@ -31,7 +32,7 @@ export class Link {
       this.token = location.hash.slice(1) || await handed();
     } catch (error) {
       this.connecting = false;
-      this.changed(false, error.message);
+      this.changed(false, this.ended ? OVER : error.message);
       setTimeout(() => this.connect(), AGAIN_MS);
       return;
     }
@@ -127,5 +128,5 @@ async function posted(token, order) {
 function reason(event, ended) {
   if (event.code === 4403) return "this address is of an earlier run: open the one that abreast prints now";
   if (event.code === 4400) return `the server hung up: ${event.reason}`;
-  return ended ? "the run is over, or the page was ended" : "the server is not reached";
+  return ended ? OVER : "the server is not reached";
 }

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import zenoh
 
-from hil.live.stopping import Stopped, may_stop, say_stop, stop_all
+from hil.live.stopping import REPEAT_S, TIMES, Stopped, may_stop, say_stop, stop_all
 from hil.live_page.browser_words import Arm, ChangeSide
 from hil.scenario.schema import Scenario
 from hil.wire import topics
@@ -38,7 +39,7 @@ class OrderLine:
         self._session, self._scenario, self._allowed, self._told = session, scenario, allowed, told
         self._names = {robot.name for robot in robots_of(scenario)}
         self._threads = ThreadPoolExecutor(4, "order")
-        self._watching = threading.Lock()
+        self._watching, self._repeating = threading.Lock(), threading.Lock()
         self._wire = self._new_wire()
 
     @property
@@ -84,17 +85,27 @@ class OrderLine:
             raise
         said.set_result(None)
         self._told(None)
-        # Whoever presses again while one listens is heard at once all the same.
-        if not self._watching.acquire(blocking=False):
-            return
-        try:
-            wire = self._new_wire()
+        if self._watching.acquire(blocking=False):
             try:
-                self._told(stop_all(wire, self._scenario, REASON))
+                self._watch()
             finally:
-                wire.close()
+                self._watching.release()
+        elif self._repeating.acquire(blocking=False):
+            # Whoever presses again while one listens what came of the last is heard as well.
+            try:
+                for _ in range(TIMES - 1):
+                    time.sleep(REPEAT_S)
+                    say_stop(self._wire, self._scenario, REASON)
+            finally:
+                self._repeating.release()
+
+    def _watch(self) -> None:
+        """Stop everybody as ``abreast stop`` does, and tell what came of it."""
+        wire = self._new_wire()
+        try:
+            self._told(stop_all(wire, self._scenario, REASON))
         finally:
-            self._watching.release()
+            wire.close()
 
     def _new_wire(self) -> Wire:
         layout = layout_of(self._scenario)

@@ -8,7 +8,7 @@ const $ = id => document.getElementById(id);
 const FRESH_S = 1, SILENT_S = 3, TOLD_MS = 300;
 
 let config = null, frame = null, came = 0, reports = null, reported = 0;
-let linked = false, place = 0, strips = [], ink = {}, stoppedAt = 0, due = false;
+let linked = false, place = 0, strips = [], ink = {}, stoppedAt = 0, heardOf = [], due = false;
 const arena = new Arena($("arena"));
 
 // --- time: how old what is shown is, on its way and since it came ------------------------------------------
@@ -18,6 +18,8 @@ const aged = age => age == null ? null : age + (frame?.link ?? 0) + since(came);
 const old = (age, most = FRESH_S) => age === null || age > most;
 const seconds = age => age === null ? "never" : age < 9.95 ? `${age.toFixed(1)} s` : age < 600 ? `${age.toFixed(0)} s` : `${(age / 60).toFixed(0)} min`;
 const signed = (value, digits, unit) => value == null ? "–" : `${value < 0 ? "−" : "+"}${Math.abs(value).toFixed(digits)} ${unit}`;
+
+const number = (value, { digits, unit, plain }) => plain ? `${value.toFixed(digits)} ${unit}` : signed(value, digits, unit);
 
 // --- elements -----------------------------------------------------------------------------------------------
 
@@ -86,13 +88,14 @@ function changed(open, why) {
 const part = (values, k) => values ? values[k] : null;
 const three = sd => sd == null ? null : 3 * sd;
 const CURVES = [
-  { name: "ρ", unit: "m", digits: 3, least: 0.05, get: f => ({ value: part(f.estimate?.shape, 0), wish: f.station[0], orbit: part(f.estimate?.orbit, 0) }) },
-  { name: "α1", unit: "rad", digits: 2, least: 0.5, wraps: true, get: f => ({ ...believed(f.estimate?.alpha1), wish: f.station[1], orbit: part(f.estimate?.orbit, 1) }) },
-  { name: "α2", unit: "rad", digits: 2, least: 0.5, wraps: true, get: f => ({ value: part(f.estimate?.shape, 2), wish: f.station[2], orbit: part(f.estimate?.orbit, 2) }) },
-  { name: "v1", unit: "m/s", digits: 3, least: 0.1, get: f => believed(f.estimate?.v1), limits: c => [c.leader.k_v] },
-  { name: "u1", unit: "rad/s", digits: 2, least: 1, get: f => believed(f.estimate?.u1), limits: c => [-c.leader.k_u, c.leader.k_u] },
-  { name: "v2 sent", unit: "m/s", digits: 3, least: 0.1, get: f => ({ value: part(f.command?.sent, 0), wish: part(f.command?.wanted, 0) }), limits: c => [-c.limits.v, c.limits.v] },
-  { name: "u2 sent", unit: "rad/s", digits: 2, least: 1, get: f => ({ value: part(f.command?.sent, 1), wish: part(f.command?.wanted, 1) }), limits: c => [-c.limits.u, c.limits.u] },
+  { name: "ρ", hue: "ink", unit: "m", plain: true, digits: 3, least: 0.05, get: f => ({ value: part(f.estimate?.shape, 0), wish: f.station[0], orbit: part(f.estimate?.orbit, 0) }) },
+  { name: "α1", hue: "ink", unit: "rad", digits: 2, least: 0.5, wraps: true, get: f => ({ ...believed(f.estimate?.alpha1), wish: f.station[1], orbit: part(f.estimate?.orbit, 1) }) },
+  { name: "α2", hue: "ink", unit: "rad", digits: 2, least: 0.5, wraps: true, get: f => ({ value: part(f.estimate?.shape, 2), wish: f.station[2], orbit: part(f.estimate?.orbit, 2) }) },
+  { name: "v1", hue: "leader", unit: "m/s", digits: 3, least: 0.1, get: f => believed(f.estimate?.v1), limits: c => [c.leader.k_v] },
+  { name: "u1", hue: "leader", unit: "rad/s", digits: 2, least: 1, get: f => believed(f.estimate?.u1), limits: c => [-c.leader.k_u, c.leader.k_u] },
+  { name: "v2 sent", hue: "follower", unit: "m/s", digits: 3, least: 0.1, get: f => ({ value: part(f.command?.sent, 0), wish: part(f.command?.wanted, 0) }), limits: c => [-c.limits.v, c.limits.v] },
+  { name: "u2 sent", hue: "follower", unit: "rad/s", digits: 2, least: 1, get: f => ({ value: part(f.command?.sent, 1), wish: part(f.command?.wanted, 1) }), limits: c => [-c.limits.u, c.limits.u] },
+  { name: "age of what a command rests on", hue: "follower", unit: "s", plain: true, digits: 3, least: 0.1, get: f => ({ value: f.command?.measurement_age ?? null }), limits: c => [c.limits.age] },
 ];
 
 function believed(values) {
@@ -114,17 +117,19 @@ function lay() {
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", `${curve.name} in ${curve.unit} over the last 30 seconds`);
     figure.append(caption, canvas);
-    return { figure, value, curve, strip: new Strip(canvas, curve.least, curve.limits?.(config) ?? []) };
+    return { figure, value, curve, strip: new Strip(canvas, curve.hue, curve.least, curve.limits?.(config) ?? []) };
   });
   put($("strips"), ...strips.map(each => each.figure));
   $("which").hidden = config.followers.length < 2;
   put($("follower"), ...config.followers.map((name, k) => new Option(name, k, false, k === place)));
   const orders = [["Arm all", { say: "arm" }], ...config.robots.map(name => [`Arm ${name}`, { say: "arm", robot: name }])];
-  if (config.pair) for (const side of ["left", "right"]) orders.push([`Go to the ${side}`, { say: "side", side }]);
+  if (config.side_changes) for (const side of ["left", "right"]) orders.push([`Go to the ${side}`, { say: "side", side }]);
   put($("orders"), ...orders.map(([text, word]) => {
     const button = make("button", text);
     button.type = "button";
     button.onclick = () => give(word);
+    button.dataset.robot = word.robot ?? "";
+    button.dataset.order = word.say;
     return button;
   }));
 }
@@ -144,7 +149,7 @@ function draw() {
   for (const each of strips) {
     each.strip.draw(frame.t, ink);
     const { samples } = each.strip, newest = samples[samples.length - 1];
-    write(each.value, newest?.value == null ? "–" : signed(newest.value, each.curve.digits, each.curve.unit));
+    write(each.value, newest?.value == null ? "–" : number(newest.value, each.curve));
   }
   tick();
 }
@@ -182,15 +187,20 @@ function robots() {
     head.scope = "row";
     const pose = aged(robot.pose_age), told = aged(robot.told_age), own = aged(robot.own_age);
     const guard = reports?.guards[name];
-    row.append(head, make("td", seconds(pose), old(pose) ? "bad" : ""),
-      make("td", robot.told ? `${signed(robot.told[0], 3, "m/s")}, ${signed(robot.told[1], 2, "rad/s")}, ${seconds(told)}` : "nothing", ""),
-      make("td", robot.own ? `${robot.stands ? "stands" : `${signed(robot.own[0], 3, "m/s")}, ${signed(robot.own[1], 2, "rad/s")}`}, ${seconds(own)}` : "none", old(own) ? "bad" : ""),
-      make("td", guard === undefined ? "not heard" : guard || "lets it drive", guard ? "bad" : ""));
+    row.append(head, make("td", seconds(pose), old(pose) ? "bad" : ""), motion(robot.told, told, false, "nothing"),
+      motion(robot.own, own, robot.stands, "none"), make("td", guard === undefined ? "not heard" : guard || "lets it drive", guard ? "bad" : ""));
     return row;
   });
   const key = rows.map(row => row.textContent).join();
   if (robots.key !== key) put($("robots"), ...rows);
   robots.key = key;
+}
+
+// A cell with speed and turn rate, how old they are, and whether that is a robot that stands.
+function motion(values, age, stands, otherwise) {
+  const cell = make("td", values ? stands ? "stands" : `${signed(values[0], 3, "m/s")}, ${signed(values[1], 2, "rad/s")}` : otherwise);
+  if (values) cell.append(make("small", `${seconds(age)} ago`, old(age) ? "bad" : ""));
+  return cell;
 }
 
 function told() {
@@ -224,7 +234,7 @@ function told() {
   write($("more"), reports.more_nodes ? `and ${reports.more_nodes} more` : "");
   write($("rates"), reports.rates.map(each => `${each.name} ${each.rate === null ? "" : `${each.rate.toFixed(0)} Hz, `}${seconds(each.age === null ? null : each.age + later)}`).join(" · "));
   const side = reports.side;
-  if (side.side) write($("which").parentElement.firstChild, `From above, ${side.side}${side.change && side.change !== "none" ? `, side change ${side.change}` : ""} `);
+  write($("side"), side.side ? `, the follower on the ${side.side}${side.change === "none" ? "" : `, side change ${side.change}`}` : "");
 }
 
 function list(parent, items, made) {
@@ -253,6 +263,7 @@ async function stop() {
   if (performance.now() - pressed < TOLD_MS) return; // a press and its click are one
   pressed = performance.now();
   stoppedAt = pressed;
+  heardOf = [];
   tellStop("Stopping …", false);
   const answer = await link.order({ say: "stop" });
   if (!answer.given) tellStop(answer.lost ? "NOT TOLD: the server is not reached. Use the robot's switch, or abreast stop." : `NOT TOLD: ${answer.text}`, true);
@@ -269,11 +280,11 @@ function tellStop(text, bad) {
 function standing() {
   const text = $("stopped").dataset.text;
   if (!text) return;
-  const seen = frame && config && came > stoppedAt && linked ? config.robots.map((name, k) => {
+  if (frame && config && came > stoppedAt && linked) heardOf = config.robots.map((name, k) => {
     const robot = frame.robots[k];
     return `${name} ${robot.stands === null ? "is not heard of" : old(aged(robot.own_age)) ? "was not heard of since" : robot.stands ? "stands" : "MOVES"}`;
-  }) : [];
-  write($("stopped"), [text, ...seen].join(" · "));
+  });
+  write($("stopped"), [text, ...heardOf, ...(heardOf.length && !linked ? ["by what was heard last"] : [])].join(" · "));
 }
 
 function reach() {
@@ -283,7 +294,10 @@ function reach() {
     : config && !config.may_stop ? "these keys may not stop anybody" : "all robots · space bar";
   if (bar.dataset.reach !== (may ? "yes" : "no")) bar.dataset.reach = may ? "yes" : "no";
   write($("how"), why);
-  for (const button of $("orders").children) button.disabled = !may;
+  for (const button of $("orders").children) {
+    const { order, robot } = button.dataset, guards = reports?.guards ?? {};
+    button.disabled = !may || order === "arm" && !(robot ? robot in guards : Object.keys(guards).length);
+  }
 }
 
 $("stop").addEventListener("pointerdown", stop);

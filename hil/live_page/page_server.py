@@ -56,6 +56,15 @@ class _Checked(RequestHandler):
         self.finish(f"{status_code}\n")
 
 
+class _Nothing(_Checked):
+    """What there is not."""
+
+    def prepare(self) -> None:
+        super().prepare()
+        if not self._finished:
+            self.send_error(404)
+
+
 class _File(_Checked):
     """A file of the page; there is nothing secret in any."""
 
@@ -208,7 +217,7 @@ def http_server(page: LivePage) -> HTTPServer:
         logging.getLogger(name).setLevel(logging.CRITICAL)
     application = Application(
         routes,
-        default_handler_class=_Checked,
+        default_handler_class=_Nothing,
         default_handler_args=given,
         websocket_max_message_size=LARGEST_WORDS,
         websocket_ping_interval=_LOST_S / 2,

@@ -32,7 +32,9 @@ from hil.wire.topics import Topics, link_topics
 _REPORTS, _STOPS = 128, 16
 """How many reports, and stops, of one look are looked at."""
 
-_MOST_NODES = 60
+_MOST_NODES, _MOST_FINDINGS, _MOST_CAUSES, _LONGEST_CAUSE = 60, 5, 10, 60
+"""Of what anybody may report: nodes, of each its findings and causes, and letters of a cause."""
+
 _STILL_V, _STILL_U = 0.01, 0.05
 """What wheels say of a robot that stands [m/s, rad/s]."""
 
@@ -93,10 +95,13 @@ class ShownLab:
             "robots": [robot.name for robot in self._robots],
             "followers": list(self.followers),
             "rho_0": given.formation.rho_0,
-            "limits": {"v": given.controller.v_max, "u": given.controller.u_max},
+            "limits": {
+                "v": given.controller.v_max,
+                "u": given.controller.u_max,
+                "age": given.controller.max_age_s,
+            },
             "leader": {"k_v": given.leader.k_v, "k_u": given.leader.k_u},
             "fence": list(fence) if isinstance(fence, tuple) else None,
-            "pair": len(self._pairs) == 1,
             "side_changes": side_changes,
         }
 
@@ -256,13 +261,14 @@ class ShownLab:
 
 
 def _clipped_node(node: Mapping[str, Any]) -> dict[str, Any]:
-    findings = [{key: clipped(text) for key, text in each.items()} for each in node["findings"][:10]]
-    refused = dict(sorted(node["refused"].items(), key=lambda each: -each[1])[:20])
+    found = node["findings"][:_MOST_FINDINGS]
+    findings = [{key: clipped(text) for key, text in each.items()} for each in found]
+    refused = dict(sorted(node["refused"].items(), key=lambda each: -each[1])[:_MOST_CAUSES])
     return {
         **node,
         "name": clipped(node["name"]),
         "says": clipped(node["says"]),
         "status": clipped(node["status"]),
-        "refused": {clipped(cause): count for cause, count in refused.items()},
+        "refused": {cause[:_LONGEST_CAUSE]: count for cause, count in refused.items()},
         "findings": findings,
     }

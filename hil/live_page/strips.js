@@ -5,8 +5,9 @@ const GAP_S = 0.6, LEFT = 44, RIGHT = 6, TOP = 6, BOTTOM = 14;
 
 // Samples of one strip: t, value, 3 sd, bound, wish, orbit; null where there is none.
 export class Strip {
-  constructor(canvas, least, limits = []) {
+  constructor(canvas, hue, least, limits = []) {
     this.canvas = canvas;
+    this.hue = hue; // name of its colour
     this.least = least; // the smallest height of the scale
     this.limits = limits;
     this.samples = [];
@@ -39,11 +40,11 @@ export class Strip {
     for (const limit of this.limits) {
       if (limit >= low && limit <= high) stroke(brush, ink.limit, 1.5, [], [[LEFT, y(limit)], [width - RIGHT, y(limit)]]);
     }
-    for (const run of runs(samples, each => each.value !== null && each.sd != null)) band(brush, run, x, y, ink.follower);
+    for (const run of runs(samples, each => each.value !== null && each.sd != null)) band(brush, run, x, y, ink[this.hue]);
     const lines = [
-      [each => each.orbit, ink.orbit, 1.6, [2, 3]], [each => each.wish, ink.wish, 1.6, [6, 4]],
+      [each => each.wish, ink.wish, 1.6, [6, 4]],
       [each => of(each.value, each.bound, 1), ink.bound, 1, []], [each => of(each.value, each.bound, -1), ink.bound, 1, []],
-      [each => each.value, ink.follower, 2, []],
+      [each => each.value, ink[this.hue], 2, []], [each => each.orbit, ink.orbit, 2, [2, 4]],
     ];
     for (const [get, colour, thick, dash] of lines) {
       for (const run of runs(samples, each => get(each) != null)) {
