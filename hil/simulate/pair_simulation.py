@@ -13,8 +13,9 @@ from formation.periodic_orbit import PeriodicOrbit, find_orbit
 from formation.spacing import lyapunov
 from hil.errors import CheckFailedError, UsageError
 from hil.extensions.reference import is_reference
-from hil.figures.simulation_figures import draw_experiment, draw_simulation
-from hil.figures.stability_figures import draw_stability
+from hil.figures.paper_figures import Kind, write_paper_figures
+from hil.figures.simulation_figures import draw_experiment, draw_simulation, simulation_paper_figures
+from hil.figures.stability_figures import draw_stability, stability_paper_figures
 from hil.judge.stability import PROVED_V1, Stability, stability_json, stability_of
 from hil.log.written_aside import written_aside
 from hil.scenario import parts as scenario_parts
@@ -31,7 +32,9 @@ _COLUMNS = ("t", "rho", "alpha1", "alpha2", "v1", "u1", "v2", "u2")
 _POSE_COLUMNS = ("x", "y", "theta")
 
 
-def simulate(scenario: Scenario, out: Path | None, *, stability: bool = False) -> Simulation:
+def simulate(
+    scenario: Scenario, out: Path | None, *, stability: bool = False, figures: Kind | None = None
+) -> Simulation:
     """Run the scenario's law on the exact shape dynamics and report on it; with ``out``, write files there.
 
     The report is the JSON of ``abreast simulate``: ``final`` shape; ``orbit`` of the reduced system, absent
@@ -66,11 +69,16 @@ def simulate(scenario: Scenario, out: Path | None, *, stability: bool = False) -
         report["orders_refused"] = why
     if out is not None:
         _write(scenario, trajectory, orbit, out)
+        if figures:
+            single = simulation_paper_figures(scenario, trajectory, orbit)
+            write_paper_figures(single, out / "figures", figures)
     if stability:
         found = stability_of(scenario, trajectory)
         report["stability"] = stability_json(found)
         if out is not None:
             _write_stability(scenario, found, out)
+            if figures:
+                write_paper_figures(stability_paper_figures(scenario, found), out / "figures", figures)
     return Simulation(
         report,
         t=trajectory.t,
