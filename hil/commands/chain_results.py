@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hil.errors import CheckFailedError
 from hil.extras import left_out_if_missing
@@ -21,12 +21,15 @@ from hil.reports.judged_log import made_folder, results_in
 from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
 
+if TYPE_CHECKING:
+    from hil.figures.paper_figures import Kind
 
-def judge_run(log: Log, scenario: Scenario, folder: Path) -> dict[str, Any]:
+
+def judge_run(log: Log, scenario: Scenario, folder: Path, figures: Kind | None = None) -> dict[str, Any]:
     """Judge the log of a run, and leave summary and picture beside it."""
     runs = [run_data_of_link(log, link) for link in links_of(scenario)]
     summary = summarise_chain(scenario, runs)
-    _write(scenario, runs, summary, folder, "run.png")
+    _write(scenario, runs, summary, folder, "run.png", figures)
     print_chain(summary)
     say(results_in(folder))
     say(
@@ -37,13 +40,20 @@ def judge_run(log: Log, scenario: Scenario, folder: Path) -> dict[str, Any]:
 
 
 def leave_replay(
-    log: Log, done: Replayed, out: Path | None, *, as_json: bool, verify: bool, strict: bool
+    log: Log,
+    done: Replayed,
+    out: Path | None,
+    figures: Kind | None,
+    *,
+    as_json: bool,
+    verify: bool,
+    strict: bool,
 ) -> None:
     """Leave what came of the replay of a chain's log where it is wished, print it, and check it."""
     summary = done.summary
     print_fed(log, *done.played)
     if out is not None:
-        _write(done.scenario, done.runs, summary, made_folder(out), "replay.png")
+        _write(done.scenario, done.runs, summary, made_folder(out), "replay.png", figures)
         for run_data in done.runs:
             write_estimates(evaluated(run_data), out / f"estimates-{run_data.scenario.follower.name}.csv")
     print_chain(summary)
@@ -58,17 +68,27 @@ def leave_replay(
 
 
 def _write(
-    scenario: Scenario, runs: Sequence[RunData], summary: dict[str, Any], folder: Path, picture: str
+    scenario: Scenario,
+    runs: Sequence[RunData],
+    summary: dict[str, Any],
+    folder: Path,
+    picture: str,
+    figures: Kind | None,
 ) -> None:
     write_json(summary, folder / "summary.json")
     trajectory = driven_trajectory(runs)
     if trajectory is None:
         note("no picture: the log does not tell where the robots really were")
         return
+    until = float(trajectory.t[-1])
     with left_out_if_missing(picture):
-        from hil.figures.chain_figures import draw_chain
+        from hil.figures.chain_figures import chain_paper_figures, draw_chain
 
-        draw_chain(scenario, trajectory, float(trajectory.t[-1]), folder / picture)
+        draw_chain(scenario, trajectory, until, folder / picture)
+        if figures:
+            from hil.figures.paper_figures import write_paper_figures
+
+            write_paper_figures(chain_paper_figures(scenario, trajectory, until), folder / "figures", figures)
 
 
 def _refuse_violated(log: Log, summary: dict[str, Any]) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from formation.collector import collector_paused
+from hil.commands.figures_option import figures_option, refuse_nowhere
 from hil.commands.outputs import OutputFile, OutputFolder
 from hil.commands.replay_folder import refuse_for_folder, replay_folder
 from hil.commands.seconds import Seconds
@@ -17,6 +18,7 @@ from hil.log.report_json import note, print_json, print_text, results_apart, say
 from hil.reports.judged_log import leave, made_folder, results_in
 
 if TYPE_CHECKING:
+    from hil.figures.paper_figures import Kind
     from hil.judge.replayed import Replayed
     from hil.judge.run_data import RunData
     from hil.log.reader import Log
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
 @click.option("--to", "to_s", type=Seconds(), metavar="S", help="Judge up to here.")
 @click.option("--csv", "table", type=OutputFile(), metavar="FILE", help="Write the estimates.")
 @click.option("--out", type=OutputFolder(), metavar="DIR", help="Folder for results.")
+@figures_option()
 @click.option(
     "--strict", is_flag=True, help="Fail if an error lies outside its extended bound or certified radius."
 )
@@ -67,6 +70,7 @@ def command(
     to_s: float | None,
     table: Path | None,
     out: Path | None,
+    figures: Kind | None,
     strict: bool,
     certify: bool,
     workers: int | None,
@@ -80,6 +84,7 @@ def command(
     --from and --to are seconds since the leader set off, for imported recordings the source's own time; the
     steps always begin where the log does.
     """
+    refuse_nowhere(figures, out)
     from hil.log.log_folder import is_folder_of_logs
     from hil.log.opened import opened_log
 
@@ -122,13 +127,13 @@ def command(
 
         _refuse_table(table, chain)
         done = replayed(given, choice)
-        leave_replay(given, done, out, as_json=as_json, verify=verify, strict=strict)
+        leave_replay(given, done, out, figures, as_json=as_json, verify=verify, strict=strict)
         _refuse_damage(given, done)
         return
     done = replayed(given, choice)
     (played,), (run_data,), summary = done.played, done.runs, done.summary
     print_fed(given, played)
-    _write(run_data, summary, table, out)
+    _write(run_data, summary, table, out, figures)
     print_summary(summary)
     if out is not None:
         say(results_in(out))
@@ -165,7 +170,9 @@ def _refuse_table(table: Path | None, chain: Scenario) -> None:
         )
 
 
-def _write(run_data: RunData, summary: dict[str, Any], table: Path | None, out: Path | None) -> None:
+def _write(
+    run_data: RunData, summary: dict[str, Any], table: Path | None, out: Path | None, figures: Kind | None
+) -> None:
     from hil.judge.replay_verdict import evaluated
     from hil.replay.estimate_csv import write_estimates
 
@@ -174,4 +181,4 @@ def _write(run_data: RunData, summary: dict[str, Any], table: Path | None, out: 
     if out is None:
         return
     write_estimates(evaluated(run_data), made_folder(out) / "estimates.csv")
-    leave(run_data, summary, out, "replay.png")
+    leave(run_data, summary, out, "replay.png", figures)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from formation.collector import collector_paused
+from hil.commands.figures_option import figures_option
 from hil.commands.guard_option import NO_GUARD
 from hil.commands.outputs import OutputFolder, new_folder
 from hil.commands.own_parts import load_own_parts
@@ -30,6 +31,7 @@ from hil.scenario.schema import Scenario
 from hil.wire.endpoints import DEFAULT_ENDPOINT, SECURE_ENDPOINT
 
 if TYPE_CHECKING:
+    from hil.figures.paper_figures import Kind
     from hil.live.run import Outcome
     from hil.wire.role_keys import RoleKeys
     from hil.wire.session import Endpoints
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
 @click.option("--estimator", metavar="E", help="Estimator: ekf, ukf, imm, or file.py:factory.")
 @click.option("--law", metavar="L", help="Law of the follower: independent, or file.py:function.")
 @click.option("--out", type=OutputFolder(), metavar="DIR", help="Folder for results.")
+@figures_option()
 @click.option(
     "--lockstep", is_flag=True, help="On a simulated clock, as fast as it goes; same seed, same bytes."
 )
@@ -96,6 +99,7 @@ def command(
     estimator: str | None,
     law: str | None,
     out: Path | None,
+    figures: Kind | None,
     overrides: tuple[str, ...],
     certify: bool,
     as_json: bool,
@@ -124,7 +128,7 @@ def command(
     load_own_parts(chosen)
     folder = _folder(chosen, out)
     with claimed(folder):
-        _run(chosen, folder, how, as_json=as_json)
+        _run(chosen, folder, how, figures, as_json=as_json)
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +198,7 @@ def _how(
     return _Live(None, crew, keys)
 
 
-def _run(chosen: Scenario, folder: Path, live: _Live | None, *, as_json: bool) -> None:
+def _run(chosen: Scenario, folder: Path, live: _Live | None, figures: Kind | None, *, as_json: bool) -> None:
     from hil.judge.made_by import law_failure
     from hil.log.rotating_log import log_place, pieces_of
 
@@ -218,7 +222,7 @@ def _run(chosen: Scenario, folder: Path, live: _Live | None, *, as_json: bool) -
             for piece in pieces_of(log_path):
                 # What is in a folder of pieces is taken for one of them by its name.
                 _make_whole(piece, piece.with_suffix(".cut.mcap" if piece == log_path else ".mcap.cut"))
-        summary = _judge(log_path, folder)
+        summary = _judge(log_path, folder, figures)
         if as_json:
             # How long it took is no part of the verdict, which is the same for every run of a seed.
             print_json(summary | timing)
@@ -326,7 +330,7 @@ def _make_whole(log_path: Path, cut: Path) -> None:
 
 
 @collector_paused()
-def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
+def _judge(log_path: Path, folder: Path, figures: Kind | None) -> dict[str, Any]:
     """Judge the log, leave summary, picture and report beside it, and print the verdict."""
     from hil.judge.summary_text import print_summary
     from hil.log.metadata import scenario_of
@@ -337,8 +341,8 @@ def _judge(log_path: Path, folder: Path) -> dict[str, Any]:
     if (own := scenario_of(log)) is not None and chain_of(own) is not None:
         from hil.commands.chain_results import judge_run
 
-        return judge_run(log, own, folder)
-    summary = judge_log(log, folder)
+        return judge_run(log, own, folder, figures)
+    summary = judge_log(log, folder, figures)
     print_summary(summary)
     say(results_in(folder))
     return summary

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from hil.commands.figures_option import figures_option, refuse_nowhere
 from hil.commands.outputs import OutputFolder
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION
 from hil.log.report_json import print_json, results_apart, say
 from hil.scenario.files import load_scenario
+
+if TYPE_CHECKING:
+    from hil.figures.paper_figures import Kind
 
 
 @click.command("simulate")
@@ -20,6 +24,7 @@ from hil.scenario.files import load_scenario
 @click.option("--duration", type=DURATION, help="Seconds to simulate.")
 @click.option("--out", type=OutputFolder(), help="Folder for pictures and CSV.")
 @click.option("--stability", is_flag=True, help="Check the propositions of the paper, too; a pair only.")
+@figures_option()
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 @results_apart()
@@ -29,6 +34,7 @@ def command(
     duration: float | None,
     out: Path | None,
     stability: bool,
+    figures: Kind | None,
     overrides: tuple[str, ...],
     as_json: bool,
 ) -> None:
@@ -38,6 +44,7 @@ def command(
     """
     from hil.simulate.experiments import experiment
 
+    refuse_nowhere(figures, out)
     chosen = [*overrides]
     if law is not None:
         chosen.append(f"controller.law={law}")
@@ -45,7 +52,7 @@ def command(
         chosen.append(f"run.duration_s={duration}")
     loaded = load_scenario(scenario, chosen)
     load_own_parts(loaded, estimates=False)
-    result = experiment(loaded, out, stability=stability).as_dict()
+    result = experiment(loaded, out, stability=stability, figures=figures).as_dict()
     if as_json:
         print_json(result)
         return

@@ -16,6 +16,7 @@ from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 from controllers.chain import ChainTrajectory
 from formation.angles import FloatArray
 from hil.extensions.reference import short
+from hil.figures.paper_figures import PaperFigure
 from hil.log.written_aside import written_aside
 from hil.scenario.schema import Scenario
 
@@ -46,11 +47,25 @@ def draw_chain(scenario: Scenario, trajectory: ChainTrajectory, until: float, pa
     rows = [figure.add_subplot(grid[row, 1]) for row in range(4)]
     draw_distances(rows[0], trajectory, scenario.formation.rho_0, colours)
     draw_speeds(rows[1], trajectory, scenario.controller.v_max, colours)
-    _draw_agents(rows[2], trajectory.t, trajectory.u, colours)
-    rows[2].set_ylabel("$u_i$ [rad/s]")
+    draw_turn_rates(rows[2], trajectory, colours)
     draw_curvatures(rows[3], trajectory, colours)
     share_time_axis(rows, trajectory.t)
     save(figure, path)
+
+
+def chain_paper_figures(scenario: Scenario, trajectory: ChainTrajectory, until: float) -> list[PaperFigure]:
+    """Each panel of the picture on its own."""
+    trajectory = _first_part(trajectory, until)
+    colours = _colours(trajectory.v.shape[1])
+    rho_0, v_max = scenario.formation.rho_0, scenario.controller.v_max
+    over = (float(trajectory.t[0]), float(trajectory.t[-1]))
+    return [
+        PaperFigure("tracks", lambda axes: draw_tracks(axes, trajectory, colours), square=True),
+        PaperFigure("rho", lambda axes: draw_distances(axes, trajectory, rho_0, colours), over),
+        PaperFigure("v", lambda axes: draw_speeds(axes, trajectory, v_max, colours), over),
+        PaperFigure("u", lambda axes: draw_turn_rates(axes, trajectory, colours), over),
+        PaperFigure("curvature", lambda axes: draw_curvatures(axes, trajectory, colours), over),
+    ]
 
 
 def share_time_axis(rows: list[Axes], t: FloatArray) -> None:
@@ -107,6 +122,12 @@ def draw_speeds(axes: Axes, trajectory: ChainTrajectory, v_max: float, colours: 
         if float(trajectory.v.min()) <= 0.9 * side <= float(trajectory.v.max()):
             axes.axhline(side, color=LIMIT, lw=1.0, ls=":")
     axes.set_ylabel("$v_i$ [m/s]")
+
+
+def draw_turn_rates(axes: Axes, trajectory: ChainTrajectory, colours: list[Colour]) -> None:
+    """Turn rates over time."""
+    _draw_agents(axes, trajectory.t, np.degrees(trajectory.u), colours)
+    axes.set_ylabel("$u_i$ [deg/s]")
 
 
 def draw_curvatures(axes: Axes, trajectory: ChainTrajectory, colours: list[Colour]) -> None:

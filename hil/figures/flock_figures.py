@@ -15,6 +15,7 @@ from controllers.flock import FlockTrajectory
 from formation.angles import FloatArray
 from hil.extensions.reference import short
 from hil.figures.chain_figures import LIMIT, QUIET, Colour, save, share_time_axis
+from hil.figures.paper_figures import PaperFigure
 from hil.scenario.schema import Scenario
 
 MOMENTS = 8
@@ -45,17 +46,26 @@ def draw_flock(
     draw_neighbours(figure.add_subplot(grid[0, 1]), trajectory, len(trajectory.t) - 1, colours)
     rows = [figure.add_subplot(grid[row, 1]) for row in (1, 2, 3)]
     draw_displacements(rows[0], trajectory, off, files)
-    for axes, values, label in (
-        (rows[1], trajectory.v, "$v_i$ [m/s]"),
-        (rows[2], trajectory.u, "$u_i$ [rad/s]"),
-    ):
-        draw_files(axes, trajectory.t, values, files)
-        axes.set_ylabel(label)
-    for side in (scenario.controller.v_max, -scenario.controller.v_max):
-        if float(trajectory.v.min()) <= 0.9 * side <= float(trajectory.v.max()):
-            rows[1].axhline(side, color=LIMIT, lw=1.0, ls=":")
+    draw_speeds(rows[1], trajectory, scenario.controller.v_max, files)
+    draw_turn_rates(rows[2], trajectory, files)
     share_time_axis(rows, trajectory.t)
     save(figure, path)
+
+
+def flock_paper_figures(
+    scenario: Scenario, trajectory: FlockTrajectory, off: FloatArray, files: Files
+) -> list[PaperFigure]:
+    """Each panel of the picture on its own."""
+    colours, last = _colours(files), len(trajectory.t) - 1
+    over = (float(trajectory.t[0]), float(trajectory.t[-1]))
+    v_max = scenario.controller.v_max
+    return [
+        PaperFigure("tracks", lambda axes: draw_from_above(axes, trajectory, colours), square=True),
+        PaperFigure("neighbours", lambda axes: draw_neighbours(axes, trajectory, last, colours), square=True),
+        PaperFigure("displacement", lambda axes: draw_displacements(axes, trajectory, off, files), over),
+        PaperFigure("v", lambda axes: draw_speeds(axes, trajectory, v_max, files), over),
+        PaperFigure("u", lambda axes: draw_turn_rates(axes, trajectory, files), over),
+    ]
 
 
 def draw_from_above(axes: Axes, trajectory: FlockTrajectory, colours: list[Colour]) -> None:
@@ -111,6 +121,21 @@ def draw_displacements(axes: Axes, trajectory: FlockTrajectory, off: FloatArray,
     axes.set_ylim(bottom=_LEAST_SHOWN)
     axes.set_ylabel("off place [m]")
     axes.legend(loc="lower right", frameon=False, fontsize=8)
+
+
+def draw_speeds(axes: Axes, trajectory: FlockTrajectory, v_max: float, files: Files) -> None:
+    """Speeds of each file, and the limit."""
+    draw_files(axes, trajectory.t, trajectory.v, files)
+    for side in (v_max, -v_max):
+        if float(trajectory.v.min()) <= 0.9 * side <= float(trajectory.v.max()):
+            axes.axhline(side, color=LIMIT, lw=1.0, ls=":")
+    axes.set_ylabel("$v_i$ [m/s]")
+
+
+def draw_turn_rates(axes: Axes, trajectory: FlockTrajectory, files: Files) -> None:
+    """Turn rates of each file."""
+    draw_files(axes, trajectory.t, np.degrees(trajectory.u), files)
+    axes.set_ylabel("$u_i$ [deg/s]")
 
 
 def draw_files(axes: Axes, t: FloatArray, values: FloatArray, files: Files) -> None:

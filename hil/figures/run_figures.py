@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
+from hil.figures.paper_figures import PaperFigure
 from hil.figures.plot_data import PlotData
 from hil.figures.robot_drawing import draw_pair
 from hil.figures.run_panels import Panel, panels_for
@@ -41,6 +42,28 @@ def draw_run(data: PlotData, summary: Mapping[str, Any], path: Path) -> None:
     figure = _figure(data)
     figure.suptitle(_title(summary), fontsize=11, y=1.0 - 0.1 / _HEIGHT)
     _save(figure, path)
+
+
+def run_paper_figures(data: PlotData) -> list[PaperFigure]:
+    """Each panel of the picture on its own, and the tracks; what there is."""
+    run = data.columns.run
+    first, last = data.seconds(np.array([run.from_ns, run.to_ns])).tolist()
+
+    def from_above(axes: Axes) -> None:
+        _draw_tracks(axes, data)
+        axes.margins(0.14)
+
+    tracks = PaperFigure("tracks", from_above, square=True)
+    panels = [
+        PaperFigure(panel.__name__.removeprefix("draw_"), _of(panel, data), (first, last))
+        for stack in panels_for(data)
+        for panel in stack
+    ]
+    return [tracks, *panels] if np.any(np.isfinite(data.columns.truth.rho)) else panels
+
+
+def _of(panel: Panel, data: PlotData) -> Callable[[Axes], None]:
+    return lambda axes: panel(axes, data)
 
 
 def _figure(data: PlotData) -> Figure:

@@ -21,7 +21,11 @@ from hil.figures.panel_strokes import (
 )
 from hil.figures.plot_data import PlotData, broken_at_jumps, with_gaps
 from hil.figures.robot_drawing import FOLLOWER
+from hil.judge.summary import percentile
 
+_DEGREES = math.degrees(1.0)
+_WIDE = 8.0
+"""Of latencies, from where on a linear axis would hide all but the longest."""
 TRUE, ORBIT = "#3c3c3c", "#7a5fa8"
 _FARTHEST = 4.0
 """A bound that is so many times out of the picture is left out: it would flatten the rest."""
@@ -39,14 +43,14 @@ def draw_alpha1(axes: Axes, data: PlotData) -> None:
     """Bearing of the follower from the leader, as :func:`draw_distance`."""
     _draw_desired(axes, data, 1, "desired")
     _draw_shape(axes, data, data.columns.truth.alpha1, data.tracked.seen.alpha1, 1)
-    axes.set_ylabel(r"$\alpha_1$ [rad]")
+    axes.set_ylabel(r"$\alpha_1$ [deg]")
 
 
 def draw_alpha2(axes: Axes, data: PlotData) -> None:
     """Bearing of the leader from the follower, as :func:`draw_distance`."""
     _draw_desired(axes, data, 2, "desired")
     _draw_shape(axes, data, data.columns.truth.alpha2, data.tracked.seen.alpha2, 2)
-    axes.set_ylabel(r"$\alpha_2$ [rad]")
+    axes.set_ylabel(r"$\alpha_2$ [deg]")
 
 
 def draw_v1(axes: Axes, data: PlotData) -> None:
@@ -72,36 +76,39 @@ def draw_v1(axes: Axes, data: PlotData) -> None:
 def draw_alpha1_error(axes: Axes, data: PlotData) -> None:
     """Error of the leader's bearing: estimate minus truth, three standard deviations, and bound."""
     columns = data.columns
-    t, sd = data.seconds(data.tracked.capture_ns), data.tracked.sd[:, QUANTITIES.index("alpha1")]
-    error = wrap(np.asarray(data.tracked.seen.alpha1) - data.tracked_true.alpha1)
+    t, sd = data.seconds(data.tracked.capture_ns), _DEGREES * data.tracked.sd[:, QUANTITIES.index("alpha1")]
+    error = _DEGREES * wrap(np.asarray(data.tracked.seen.alpha1) - data.tracked_true.alpha1)
     fill_band(axes, t, np.zeros(len(t)), 3.0 * sd)
     axes.plot(*with_gaps(t, error), color=BELIEVED, lw=0.9, label="error")
     reach = 4.0 * float(np.median(sd))
     judged = data.seconds(columns.samples.capture_ns)
     if "alpha1" in data.bounds:
-        bound = data.bounds["alpha1" + data.drawn_bound]
-        at_samples = wrap(np.asarray(columns.samples.seen.alpha1) - columns.true.alpha1)
+        bound = _DEGREES * data.bounds["alpha1" + data.drawn_bound]
+        at_samples = _DEGREES * wrap(np.asarray(columns.samples.seen.alpha1) - columns.true.alpha1)
         largest = float(np.max(np.abs(at_samples), where=np.isfinite(at_samples), initial=0.0))
         reach = max(reach, 1.5 * largest)
         if np.max(bound) < _FARTHEST * reach:
             reach = max(reach, 1.15 * float(np.max(bound)))
             draw_bounds(axes, judged, -bound, bound, data.drawn_bound)
-        mark_violations(axes, judged, at_samples, np.abs(at_samples), bound)
-    axes.set_ylim(-min(reach, math.pi), min(reach, math.pi))
-    axes.set_ylabel(r"$\hat\alpha_1 - \alpha_1$ [rad]")
+        mark_violations(axes, judged, at_samples, np.abs(at_samples) / _DEGREES, bound / _DEGREES)
+    axes.set_ylim(-min(reach, 180.0), min(reach, 180.0))
+    axes.set_ylabel(r"$\hat\alpha_1 - \alpha_1$ [deg]")
 
 
 def draw_u1(axes: Axes, data: PlotData) -> None:
     """Leader's turn rate: estimate with three standard deviations, and truth."""
-    t, u1, sd = data.seconds(data.tracked.capture_ns), data.tracked.u1, data.tracked.sd[:, 4]
+    t, u1 = data.seconds(data.tracked.capture_ns), _DEGREES * data.tracked.u1
+    sd = _DEGREES * data.tracked.sd[:, 4]
     fill_band(axes, t, u1, 3.0 * sd)
     axes.plot(*with_gaps(t, u1), color=BELIEVED, lw=0.9, label="estimate")
     truth = data.columns.truth
     if np.any(np.isfinite(truth.u1)):
-        axes.plot(data.seconds(truth.capture_ns), truth.u1, color=TRUE, lw=1.2, label=data.truth_name)
-    reach = 2.0 * data.run_data.scenario.leader.k_u
+        axes.plot(
+            data.seconds(truth.capture_ns), _DEGREES * truth.u1, color=TRUE, lw=1.2, label=data.truth_name
+        )
+    reach = 2.0 * _DEGREES * data.run_data.scenario.leader.k_u
     limit_to(axes, -reach, reach)
-    axes.set_ylabel("$u_1$ [rad/s]")
+    axes.set_ylabel("$u_1$ [deg/s]")
 
 
 def draw_v2(axes: Axes, data: PlotData) -> None:
@@ -112,30 +119,34 @@ def draw_v2(axes: Axes, data: PlotData) -> None:
 
 def draw_u2(axes: Axes, data: PlotData) -> None:
     """Follower's turn rate as commanded, against its limit."""
-    _draw_command(axes, data, data.columns.commands.u2, data.run_data.scenario.controller.u_max)
-    axes.set_ylabel("$u_2$ [rad/s]")
+    u_max = _DEGREES * data.run_data.scenario.controller.u_max
+    _draw_command(axes, data, _DEGREES * data.columns.commands.u2, u_max)
+    axes.set_ylabel("$u_2$ [deg/s]")
 
 
 def draw_latency(axes: Axes, data: PlotData) -> None:
-    """From every capture to the first command that rests on an estimate of it."""
+    """From every capture to the first command that rests on an estimate of it, none of them cut off.
+
+    The axis is logarithmic where the longest is many times the median.
+    """
     commands = data.columns.commands
     first = commands.fresh
-    waits_ms = (commands.issued_ns - commands.capture_ns)[first] * 1e-6
-    axes.plot(
-        data.seconds(commands.issued_ns[first]),
-        waits_ms,
-        ls="none",
-        marker=".",
-        ms=2.0,
-        color=FOLLOWER,
-        label="capture to command",
-    )
-    median = float(np.median(waits_ms))
-    axes.set_ylim(0.0, 1.6 * max(float(np.percentile(waits_ms, 99.5)), 1.05 * median))
+    waits_ms: FloatArray = (commands.issued_ns - commands.capture_ns)[first] * np.float64(1e-6)
+    t, median, largest = data.seconds(commands.issued_ns[first]), percentile(waits_ms, 50.0), np.max(waits_ms)
+    axes.plot(t, waits_ms, ls="none", marker=".", ms=2.0, color=FOLLOWER, label="capture to command")
+    for name, level, style in (("median", 50.0, "--"), ("99 %", 99.0, ":")):
+        value = percentile(waits_ms, level)
+        axes.axhline(value, color=LIMIT, lw=0.9, ls=style, label=f"{name} {value:.3g}")
+    if np.min(waits_ms) > 0.0 and largest > _WIDE * median:
+        axes.set_yscale("log")
+        axes.set_ylim(0.7 * float(np.min(waits_ms)), 2.0 * float(largest))
+    else:
+        axes.set_ylim(0.0, 1.3 * float(largest))
     axes.set_ylabel("latency [ms]")
 
 
 Panel = Callable[[Axes, PlotData], None]
+"""What draws a panel; the name of its function without ``draw_`` is what it is called."""
 
 
 def panels_for(data: PlotData) -> tuple[list[Panel], list[Panel], list[Panel]]:
@@ -159,7 +170,7 @@ def _draw_desired(axes: Axes, data: PlotData, column: int, label: str) -> None:
     """Where the formation wants a quantity; other labs' robots were not told."""
     if data.run_data.motion_since_ns is not None:
         t, courses = data.desired()
-        axes.plot(t, courses[column], color=LIMIT, lw=1.0, ls=":", label=label)
+        axes.plot(t, _shown(courses[column], column), color=LIMIT, lw=1.0, ls=":", label=label)
 
 
 def _draw_shape(axes: Axes, data: PlotData, true: FloatArray, seen: Values, column: int) -> None:
@@ -168,15 +179,22 @@ def _draw_shape(axes: Axes, data: PlotData, true: FloatArray, seen: Values, colu
     known = bool(np.any(np.isfinite(true)))
     if data.orbit is not None:
         wanted = moments[moments >= data.orbit.from_ns]
-        ideal = with_gaps(data.seconds(wanted), broken_at_jumps(data.orbit.at(wanted)[column]))
+        ideal = with_gaps(
+            data.seconds(wanted), _shown(broken_at_jumps(data.orbit.at(wanted)[column]), column)
+        )
         axes.plot(*ideal, color=ORBIT, lw=1.1, ls="--", label="noise-free", zorder=3)
     if known:
-        truth = with_gaps(data.seconds(moments), broken_at_jumps(true))
+        truth = with_gaps(data.seconds(moments), _shown(broken_at_jumps(true), column))
         axes.plot(*truth, color=TRUE, lw=1.4, label=data.truth_name)
     if data.orbit is None or not known:
         t = data.seconds(data.tracked.capture_ns)
-        estimate = with_gaps(t, broken_at_jumps(np.asarray(seen)))
+        estimate = with_gaps(t, _shown(broken_at_jumps(np.asarray(seen)), column))
         axes.plot(*estimate, color=BELIEVED, lw=1.1, label="estimate")
+
+
+def _shown(course: FloatArray, column: int) -> FloatArray:
+    """Distances as they are, bearings in degrees."""
+    return course if column == 0 else np.asarray(_DEGREES * course)
 
 
 def _draw_command(axes: Axes, data: PlotData, sent: FloatArray, limit: float) -> None:

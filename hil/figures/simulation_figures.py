@@ -18,6 +18,7 @@ from formation.closed_loop import Trajectory
 from formation.periodic_orbit import PeriodicOrbit
 from formation.shape import ABREAST_ALPHA1, ABREAST_ALPHA2
 from hil.extensions.reference import is_reference, short
+from hil.figures.paper_figures import PaperFigure
 from hil.log.written_aside import written_aside
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
@@ -26,14 +27,15 @@ LEADER, FOLLOWER = "#1f5fa8", "#d9741a"
 ORBIT, NOW, QUIET, LIMIT = "#3c3c3c", "#2a8f4c", "#8a8a8a", "#b03030"
 MOMENTS = 7
 DPI = 130
-_PI_TICKS = {
-    -math.pi: r"$-\pi$",
-    ABREAST_ALPHA1: r"$-\pi/2$",
+_QUARTERS = {
+    -math.pi: "$-180$",
+    ABREAST_ALPHA1: "$-90$",
     0.0: "$0$",
-    ABREAST_ALPHA2: r"$\pi/2$",
-    math.pi: r"$\pi$",
+    ABREAST_ALPHA2: "$90$",
+    math.pi: "$180$",
 }
-_POLAR_TICKS = ("$0$", r"$\pi/4$", r"$\pi/2$", r"$3\pi/4$", r"$\pi$", r"$-3\pi/4$", r"$-\pi/2$", r"$-\pi/4$")
+"""Angles [rad] where bearings have ticks, and what these are called, in degrees."""
+_POLAR_TICKS = tuple(f"${angle}$°" for angle in (0, 45, 90, 135, 180, -135, -90, -45))
 
 
 def draw_simulation(
@@ -68,6 +70,27 @@ def draw_experiment(scenario: Scenario, trajectory: Trajectory, path: Path) -> N
     draw_turn_rate(rows[3], scenario, trajectory)
     _share_time(rows, trajectory)
     _save(figure, path)
+
+
+def simulation_paper_figures(
+    scenario: Scenario, trajectory: Trajectory, orbit: PeriodicOrbit | None
+) -> list[PaperFigure]:
+    """Each panel of both pictures on its own."""
+
+    def polar(axes: Axes) -> None:
+        assert isinstance(axes, PolarAxes)
+        draw_polar(axes, scenario, trajectory, orbit)
+
+    over = (float(trajectory.t[0]), float(trajectory.t[-1]))
+    rho_0 = scenario.formation.rho_0
+    return [
+        PaperFigure("tracks", lambda axes: draw_tracks(axes, trajectory, rho_0), square=True),
+        PaperFigure("shape", polar, polar=True),
+        PaperFigure("distance", lambda axes: draw_distance(axes, trajectory, rho_0), over),
+        PaperFigure("bearings", lambda axes: draw_bearings(axes, scenario, trajectory), over),
+        PaperFigure("v2", lambda axes: draw_speed(axes, scenario, trajectory), over),
+        PaperFigure("u2", lambda axes: draw_turn_rate(axes, scenario, trajectory), over),
+    ]
 
 
 def draw_tracks(axes: Axes, trajectory: Trajectory, rho_0: float) -> None:
@@ -146,9 +169,9 @@ def draw_bearings(axes: Axes, scenario: Scenario, trajectory: Trajectory) -> Non
         + 0.3
     )
     axes.set_ylim(low, high)
-    axes.set_yticks([tick for tick in _PI_TICKS if low <= tick <= high])
-    axes.set_yticklabels([text for tick, text in _PI_TICKS.items() if low <= tick <= high])
-    axes.set_ylabel(r"$\alpha_i$ [rad]")
+    axes.set_yticks([tick for tick in _QUARTERS if low <= tick <= high])
+    axes.set_yticklabels([text for tick, text in _QUARTERS.items() if low <= tick <= high])
+    axes.set_ylabel(r"$\alpha_i$ [deg]")
     axes.legend(loc="center right", ncols=2, frameon=False, fontsize=9, borderaxespad=0.1)
 
 
@@ -165,9 +188,9 @@ def draw_speed(axes: Axes, scenario: Scenario, trajectory: Trajectory) -> None:
 
 def draw_turn_rate(axes: Axes, scenario: Scenario, trajectory: Trajectory) -> None:
     """Follower's turn rate over time; dashed u1, the rate that holds the formation exactly."""
-    limit = _named_limit(scenario, scenario.controller.u_max)
-    _draw_control(axes, trajectory.t, trajectory.u2, trajectory.u1, limit)
-    axes.set_ylabel("$u_2$ [rad/s]")
+    limit = _named_limit(scenario, math.degrees(scenario.controller.u_max))
+    _draw_control(axes, trajectory.t, np.degrees(trajectory.u2), np.degrees(trajectory.u1), limit)
+    axes.set_ylabel("$u_2$ [deg/s]")
 
 
 def _named_limit(scenario: Scenario, limit: float) -> tuple[float, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from matplotlib.ticker import NullFormatter, ScalarFormatter
 
 from controllers.attraction import SettlingMap
 from formation.spacing import Spacing
+from hil.figures.paper_figures import PaperFigure
 from hil.judge.stability import PROVED_V1, Gain, Stability
 from hil.log.written_aside import written_aside
 from hil.scenario.parts import gains
@@ -22,7 +24,7 @@ from hil.scenario.schema import Scenario
 PROVED, RUN, WORST, TURN, LOST = "#b03030", "#1f5fa8", "#d9741a", "#2a8f4c", "#d8d8d8"
 DPI = 130
 _PI_TICKS = (-math.pi, -0.5 * math.pi, 0.0, 0.5 * math.pi, math.pi)
-_PI_LABELS = (r"$-\pi$", r"$-\pi/2$", "$0$", r"$\pi/2$", r"$\pi$")
+_PI_LABELS = ("$-180$", "$-90$", "$0$", "$90$", "$180$")
 
 
 def draw_stability(scenario: Scenario, found: Stability, path: Path) -> None:
@@ -31,17 +33,9 @@ def draw_stability(scenario: Scenario, found: Stability, path: Path) -> None:
     figure.suptitle(f"{scenario.name}: the propositions in numbers", fontsize=11)
     grid = figure.add_gridspec(2, 6)
     spacing = gains(scenario).spacing
-    longest = max(
-        float(np.nanquantile(each.settled_s, 0.98)) if each.share else 1.0
-        for each in (found.free, found.limited)
-    )
-    titles = (
-        (found.free, r"no limits, $\alpha_2(0) = \pi/2$"),
-        (found.limited, r"within limits, $\alpha_2(0) = \pi/2$"),
-        (found.turned, rf"within limits, $\alpha_2(0) = {found.turned.alpha2:.2f}$"),
-    )
+    longest = _longest(found)
     maps = []
-    for column, (each, title) in enumerate(titles):
+    for column, (each, title) in enumerate(_titled(found)):
         axes = figure.add_subplot(grid[0, 2 * column : 2 * column + 2])
         mesh = draw_map(axes, each, spacing, longest)
         axes.set_title(f"{title}: {each.share:.1%} settle", fontsize=10)
@@ -56,6 +50,47 @@ def draw_stability(scenario: Scenario, found: Stability, path: Path) -> None:
     FigureCanvasAgg(figure)
     with written_aside(path) as aside:
         figure.savefig(aside, dpi=DPI, metadata={"Software": None})
+
+
+def stability_paper_figures(scenario: Scenario, found: Stability) -> list[PaperFigure]:
+    """Each panel of the picture on its own."""
+    spacing, longest, margin = gains(scenario).spacing, _longest(found), found.margin
+
+    def settling(each: SettlingMap, title: str, axes: Axes) -> None:
+        mesh = draw_map(axes, each, spacing, longest)
+        axes.set_title(f"{title}: {each.share:.1%} settle")
+        figure = axes.figure
+        assert isinstance(figure, Figure)
+        figure.colorbar(mesh, ax=axes, label="settled after [s]")
+
+    names = ("settling-free", "settling-limited", "settling-turned")
+    maps = [
+        PaperFigure(name, partial(settling, each, title), square=True)
+        for name, (each, title) in zip(names, _titled(found), strict=True)
+    ]
+    return [
+        *maps,
+        PaperFigure("lyapunov", lambda axes: draw_lyapunov(axes, found)),
+        PaperFigure(
+            "gain", lambda axes: draw_gain(axes, found.gain, spacing, margin.lower, margin.upper), square=True
+        ),
+    ]
+
+
+def _longest(found: Stability) -> float:
+    """Settling time [s] that has the last colour of the maps."""
+    return max(
+        float(np.nanquantile(each.settled_s, 0.98)) if each.share else 1.0
+        for each in (found.free, found.limited)
+    )
+
+
+def _titled(found: Stability) -> tuple[tuple[SettlingMap, str], ...]:
+    return (
+        (found.free, r"no limits, $\alpha_2(0) = 90$°"),
+        (found.limited, r"within limits, $\alpha_2(0) = 90$°"),
+        (found.turned, rf"within limits, $\alpha_2(0) = {math.degrees(found.turned.alpha2):.0f}$°"),
+    )
 
 
 def draw_map(axes: Axes, found: SettlingMap, spacing: Spacing, longest: float) -> QuadMesh:
@@ -74,7 +109,7 @@ def draw_map(axes: Axes, found: SettlingMap, spacing: Spacing, longest: float) -
     axes.yaxis.set_major_formatter(ScalarFormatter())
     axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_xticks(_PI_TICKS, _PI_LABELS)
-    axes.set_xlabel(r"$\alpha_1(0)$ [rad]")
+    axes.set_xlabel(r"$\alpha_1(0)$ [deg]")
     axes.set_ylabel(r"$\rho(0) / \rho_0$")
     return mesh
 
@@ -92,9 +127,9 @@ def draw_lyapunov(axes: Axes, found: Stability) -> None:
 
 def draw_gain(axes: Axes, gain: Gain, spacing: Spacing, lower: float, upper: float) -> None:
     """Range of distances that any steering within k_u can bring about, and those of constant turns."""
-    rho_0 = spacing.rho_0
+    rho_0, k_u = spacing.rho_0, np.degrees(gain.k_u)
     axes.fill_between(
-        gain.k_u,
+        k_u,
         gain.rho_min / rho_0,
         gain.rho_max / rho_0,
         color=WORST,
@@ -103,13 +138,15 @@ def draw_gain(axes: Axes, gain: Gain, spacing: Spacing, lower: float, upper: flo
         label="any steering",
     )
     for distance, label in ((gain.rho_outward, r"constant $u_1 = \pm k_u$"), (gain.rho_inward, None)):
-        axes.plot(gain.k_u, distance / rho_0, color=TURN, lw=1.4, label=label)
+        axes.plot(k_u, distance / rho_0, color=TURN, lw=1.4, label=label)
     axes.axhline(1.0, color="#8a8a8a", lw=1.0, ls="--")
-    axes.axvline(gain.end, color=PROVED, lw=1.4, label=r"$\mu_\rho v_1$: the gain ends")
-    axes.axvspan(lower, upper, color=RUN, alpha=0.12, lw=0, label="$k_u^*$ lies here")
+    axes.axvline(math.degrees(gain.end), color=PROVED, lw=1.4, label=r"$\mu_\rho v_1$: the gain ends")
+    axes.axvspan(
+        math.degrees(lower), math.degrees(upper), color=RUN, alpha=0.12, lw=0, label="$k_u^*$ lies here"
+    )
     axes.set_ylim(0.0, 5.0)
-    axes.set_xlim(0.0, 1.05 * gain.end)
-    axes.set_xlabel("bound $k_u$ of the leader's turn rate [rad/s]")
+    axes.set_xlim(0.0, 1.05 * math.degrees(gain.end))
+    axes.set_xlabel("bound $k_u$ of the leader's turn rate [deg/s]")
     axes.set_ylabel(r"$\rho / \rho_0$ in the long run")
     axes.grid(alpha=0.25)
     axes.legend(loc="upper left", frameon=False, fontsize=9)

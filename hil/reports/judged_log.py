@@ -15,6 +15,7 @@ from hil.log.report_json import write_json
 from hil.log.written_aside import write_text_aside
 
 if TYPE_CHECKING:
+    from hil.figures.paper_figures import Kind
     from hil.judge.run_data import RunData
     from hil.log.reader import Log
 
@@ -42,14 +43,17 @@ def claimed(folder: Path) -> Iterator[None]:
         os.close(held)
 
 
-def judge_log(log: Log, folder: Path) -> dict[str, Any]:
-    """Summary of the log of a pair; ``summary.json``, ``run.png`` and ``report.html`` go into the folder."""
+def judge_log(log: Log, folder: Path, figures: Kind | None = None) -> dict[str, Any]:
+    """Summary of the log of a pair; ``summary.json``, ``run.png`` and ``report.html`` go into the folder.
+
+    ``figures``: as :func:`leave`.
+    """
     from hil.judge.run_data import run_data_of_log
     from hil.judge.summary import summarise
 
     run_data = run_data_of_log(log)
     summary = summarise(run_data)
-    leave(run_data, summary, folder, "run.png")
+    leave(run_data, summary, folder, "run.png", figures)
     return summary
 
 
@@ -59,19 +63,30 @@ def results_in(folder: Path) -> str:
     return f"results in {folder}" + (f", look at {report}" if report.exists() else "")
 
 
-def leave(run_data: RunData, summary: Mapping[str, Any], folder: Path, picture: str) -> None:
+def leave(
+    run_data: RunData,
+    summary: Mapping[str, Any],
+    folder: Path,
+    picture: str,
+    figures: Kind | None = None,
+) -> None:
     """Write the summary of a run's data, its picture by the given name, and its report.
 
-    Where the extra is missing that draws them, the summary alone, and say so on stderr.
+    ``figures``: each figure on its own as well, of that kind, in a folder ``figures`` there. Where the extra
+    is missing that draws them, the summary alone, and say so on stderr.
     """
     # All that drawing needs: a second of imports, for those who ask only.
     from hil.figures.plot_data import PlotData
 
     write_json(summary, folder / "summary.json")
     with left_out_if_missing(f"{picture} and no report.html"):
-        from hil.figures.run_figures import draw_run
+        from hil.figures.run_figures import draw_run, run_paper_figures
         from hil.reports.run_report import run_report
 
         data = PlotData.of(run_data)
         draw_run(data, summary, folder / picture)
         write_text_aside(folder / "report.html", run_report(data, summary))
+        if figures:
+            from hil.figures.paper_figures import write_paper_figures
+
+            write_paper_figures(run_paper_figures(data), folder / "figures", figures)

@@ -49,7 +49,7 @@ dt { font-weight: 600; } dd { margin: 0; min-width: 0; overflow-wrap: anywhere; 
 .narrow { grid-template-columns: repeat(auto-fit, minmax(min(100%, 20rem), 1fr)); }
 .tall { grid-row: span 2; }
 .tables { display: grid; gap: 1rem 1.5rem; align-items: start; margin: .8rem 0;
-  grid-template-columns: repeat(auto-fit, minmax(min(100%, 22rem), 1fr)); }
+  grid-template-columns: repeat(auto-fill, minmax(min(100%, 23rem), 1fr)); }
 figure { margin: 0; min-width: 0; scroll-margin-top: .5rem; }
 .wide { overflow-x: auto; border: 1px solid var(--line); border-radius: .4rem; padding: .3rem .5rem;
   scrollbar-width: thin; scrollbar-color: var(--frame) transparent; }

@@ -13,6 +13,8 @@ from hil.reports.notation import written
 
 GOOD, WARN, BAD, PLAIN = "good", "warn", "bad", "soft"
 _SIGNS = {GOOD: ("✓", "good: "), WARN: ("!", "look again: "), BAD: ("✗", "bad: "), PLAIN: ("·", "")}
+_FAR = 0.5
+"""Who is further off his station than this share of the least distance is not in formation, noise or not."""
 PLACES = {
     "bounds": "bounds",
     "formation": "formation",
@@ -123,6 +125,9 @@ def _formation(summary: Mapping[str, Any]) -> Reason | None:
     if "rho_min" not in formation:
         return None
     text = f"rho {formation['rho_min']:.3f} to {formation['rho_max']:.3f} m"
+    station = formation.get("equilibrium_deviation_rms", {}).get("rho", 0.0)
+    if station > _FAR * formation["rho_min"]:
+        return Reason("formation", WARN, f"{text}, {station:.2g} m RMS off its station")
     if "orbit_deviation_rms" in formation:
         off = f"{1e3 * formation['orbit_deviation_rms']['rho']:.1f} mm"
         return Reason("formation", GOOD, f"{text}, {off} RMS off the noise-free run")

@@ -61,9 +61,10 @@ def summary_tables(summary: Mapping[str, Any]) -> dict[str, str]:
             for path, label in labels.items()
             if path in left
         ]
-        tables.setdefault(_PARTS.get(caption, "latency"), []).append(
-            table_html(caption, ("", "value", "unit"), rows)
-        )
+        counted = not any(unit for *_, unit in rows)
+        header = ("", "count") if counted else ("", "value", "unit")
+        cells = [row[: len(header)] for row in rows]
+        tables.setdefault(_PARTS.get(caption, "latency"), []).append(table_html(caption, header, cells))
     for group, (part, caption) in _COUNTS.items():
         counts = [
             (path.removeprefix(f"{group}.").replace("_", " "), _text(left.pop(path)))
@@ -127,7 +128,7 @@ def _by_quantity(left: dict[str, Any], caption: str, columns: _Columns) -> str:
             scaled = scale_of(name) * value if column in ("rmse", "max") and value is not None else value
             cells.append("–" if value is None else tell(scaled))
         if set(cells) - {"–"}:
-            rows.append((f"{symbol} [{unit}]", *cells))
+            rows.append((f"{symbol}\u00a0[{unit}]", *cells))
     return table_html(caption, ("", *(label for label, _ in held.values())), rows)
 
 
@@ -141,7 +142,7 @@ def _published(left: dict[str, Any]) -> str:
         violated = left.pop(f"{path}.violations.{name}", None)
         if median is not None:
             figures = (_number(label.scale * median), _share(shares[0]), _count(violated), _share(shares[1]))
-            rows.append((f"{label.words} [{label.unit}]", *figures))
+            rows.append((f"{label.words}\u00a0[{label.unit}]", *figures))
     over = "" if checked is None else f", checked in {checked} samples"
     header = ("", "median", "says something", "violated in", "largest error / bound")
     return table_html(f"Bounds as published with the estimates{over}", header, rows)

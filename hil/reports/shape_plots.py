@@ -78,7 +78,7 @@ def _panels(
             at = ", ".join(f"{value:.4g}" for value in dict.fromkeys(level[0].tolist()))
             keys.append(Key(f"station, {at} {unit}", GREY, "dotted"))
         if ideals is not None:
-            draw_line(plot, source, "ideal", ORBIT, dash="dashed")
+            draw_line(plot, table(t, held["ideal"], {"y": held["ideal"]}), "y", ORBIT, dash="dashed")
             keys.append(Key("noise-free run", ORBIT, "dashed"))
             tips["noise-free"] = f"@ideal{{{digits}}} {unit}"
         hover(plot, draw_line(plot, source, "y", colour), tips)

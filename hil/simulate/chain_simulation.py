@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from hil.scenario.travel import as_travelled
 from hil.simulate.simulation import Simulation
 from hil.simulate.track_table import write_tracks
 
+if TYPE_CHECKING:
+    from hil.figures.paper_figures import Kind
+
 SAMPLE_STEP = 0.01
 MOST_CELLS = 20_000_000
 """Numbers that a run may keep: longer runs of longer chains are sampled more coarsely."""
@@ -27,7 +31,9 @@ MOST_CELLS = 20_000_000
 _SHOWN_AFTER, _SHOWN_AT_LEAST = 1.3, 0.25
 
 
-def simulate_chain_of(scenario: Scenario, agents: int, out: Path | None) -> Simulation:
+def simulate_chain_of(
+    scenario: Scenario, agents: int, out: Path | None, figures: Kind | None = None
+) -> Simulation:
     """Run a chain of ``agents`` on the exact shape dynamics and report on each pair; ``out`` takes files.
 
     ``pairs``, one for each follower: ``settle_s``, from when on the pair keeps its station
@@ -46,7 +52,7 @@ def simulate_chain_of(scenario: Scenario, agents: int, out: Path | None) -> Simu
         raise CheckFailedError(f"scenario {scenario.name}: {error}; check gains and start poses") from error
     settled = settling_times(trajectory, scenario.formation.rho_0, scenario_parts.station(scenario), EXACTLY)
     if out is not None:
-        _write(scenario, trajectory, settled, out)
+        _write(scenario, trajectory, settled, out, figures)
     pairs = [pair_figures(trajectory, k, settled[k], scenario.controller.v_max) for k in range(agents - 1)]
     recovered = all(moment is not None for moment in settled)
     return Simulation(
@@ -61,7 +67,13 @@ def simulate_chain_of(scenario: Scenario, agents: int, out: Path | None) -> Simu
     )
 
 
-def _write(scenario: Scenario, trajectory: ChainTrajectory, settled: list[float | None], out: Path) -> None:
+def _write(
+    scenario: Scenario,
+    trajectory: ChainTrajectory,
+    settled: list[float | None],
+    out: Path,
+    figures: Kind | None,
+) -> None:
     last = max((math.inf if moment is None else moment for moment in settled), default=0.0)
     until = max(_SHOWN_AFTER * last, _SHOWN_AT_LEAST * float(trajectory.t[-1]))
     try:
@@ -69,9 +81,13 @@ def _write(scenario: Scenario, trajectory: ChainTrajectory, settled: list[float 
         agents = (trajectory.poses, trajectory.v, trajectory.u)
         write_tracks(out / "trajectory.csv", trajectory.t, *agents, _shapes(trajectory))
         with left_out_if_missing("chain.png"):
-            from hil.figures.chain_figures import draw_chain
+            from hil.figures.chain_figures import chain_paper_figures, draw_chain
+            from hil.figures.paper_figures import write_paper_figures
 
             draw_chain(scenario, trajectory, until, out / "chain.png")
+            if figures:
+                single = chain_paper_figures(scenario, trajectory, until)
+                write_paper_figures(single, out / "figures", figures)
     except OSError as error:
         raise UsageError(f"{out}: cannot be written ({error.strerror}); choose another --out") from error
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -10,9 +11,16 @@ from hil.errors import UsageError
 from hil.scenario.schema import Scenario
 from hil.simulate.simulation import Simulation
 
+if TYPE_CHECKING:
+    from hil.figures.paper_figures import Kind
 
-def experiment(scenario: Scenario, out: Path | None = None, *, stability: bool = False) -> Simulation:
+
+def experiment(
+    scenario: Scenario, out: Path | None = None, *, stability: bool = False, figures: Kind | None = None
+) -> Simulation:
     """Run it; with ``out``, pictures and CSV go there. ``stability``: check the propositions too.
+
+    ``figures``: single figures for a paper as well, below ``out``.
 
     Raises :class:`UsageError` for what a chain or a flock cannot do, and
     :class:`~hil.errors.CheckFailedError` if the motion breaks down.
@@ -26,15 +34,15 @@ def experiment(scenario: Scenario, out: Path | None = None, *, stability: bool =
             )
         from hil.simulate.chain_simulation import simulate_chain_of
 
-        return simulate_chain_of(scenario, chain.agents, out)
+        return simulate_chain_of(scenario, chain.agents, out, figures)
     if not isinstance(flock, msgspec.UnsetType):
         _refuse_what_is_for_a_pair(scenario, "flock", stability=stability)
         from hil.simulate.flock_simulation import simulate_flock_of
 
-        return simulate_flock_of(scenario, flock, out)
+        return simulate_flock_of(scenario, flock, out, figures)
     from hil.simulate.pair_simulation import simulate
 
-    return simulate(scenario, out, stability=stability)
+    return simulate(scenario, out, stability=stability, figures=figures)
 
 
 def _refuse_what_is_for_a_pair(scenario: Scenario, section: str, *, stability: bool) -> None:

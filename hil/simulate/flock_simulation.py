@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,9 @@ from hil.scenario.travel import as_travelled
 from hil.simulate.simulation import Simulation
 from hil.simulate.track_table import write_tracks
 
+if TYPE_CHECKING:
+    from hil.figures.paper_figures import Kind
+
 _ROUNDING = 1e-6
 
 
@@ -36,7 +40,9 @@ class FlockRun:
     files: NDArray[np.int64]
 
 
-def simulate_flock_of(scenario: Scenario, flock: FlockSection, out: Path | None) -> Simulation:
+def simulate_flock_of(
+    scenario: Scenario, flock: FlockSection, out: Path | None, figures: Kind | None = None
+) -> Simulation:
     """Run a flock and report on it; with ``out``, write ``trajectory.csv`` and ``flock.png`` there.
 
     ``gathered_s``: when for the first time all agents are in their places (off by at most the share of
@@ -60,7 +66,7 @@ def simulate_flock_of(scenario: Scenario, flock: FlockSection, out: Path | None)
     distances = np.abs(places[:, 1]) / (scenario.formation.rho_0 * math.sqrt(0.75))
     run = FlockRun(places, trajectory, off, np.rint(distances).astype(np.int64))
     if out is not None:
-        _write(scenario, run, out)
+        _write(scenario, run, out, figures)
     return Simulation(_report(scenario, run), trajectory.t, trajectory.poses, trajectory.v, trajectory.u)
 
 
@@ -146,7 +152,7 @@ def _file(run: FlockRun, number: int) -> dict[str, float]:
     }
 
 
-def _write(scenario: Scenario, run: FlockRun, out: Path) -> None:
+def _write(scenario: Scenario, run: FlockRun, out: Path, figures: Kind | None) -> None:
     trajectory = run.trajectory
     further = {f"off_{agent + 1}": run.off[:, agent] for agent in range(1, len(run.places))}
     try:
@@ -154,8 +160,12 @@ def _write(scenario: Scenario, run: FlockRun, out: Path) -> None:
         agents = (trajectory.poses, trajectory.v, trajectory.u)
         write_tracks(out / "trajectory.csv", trajectory.t, *agents, further)
         with left_out_if_missing("flock.png"):
-            from hil.figures.flock_figures import draw_flock
+            from hil.figures.flock_figures import draw_flock, flock_paper_figures
+            from hil.figures.paper_figures import write_paper_figures
 
             draw_flock(scenario, trajectory, run.off, run.files, out / "flock.png")
+            if figures:
+                single = flock_paper_figures(scenario, trajectory, run.off, run.files)
+                write_paper_figures(single, out / "figures", figures)
     except OSError as error:
         raise UsageError(f"{out}: cannot be written ({error.strerror}); choose another --out") from error

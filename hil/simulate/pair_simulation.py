@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from hil.scenario.schema import Scenario
 from hil.scenario.travel import as_travelled
 from hil.simulate.simulation import Simulation
 
+if TYPE_CHECKING:
+    from hil.figures.paper_figures import Kind
+
 SAMPLE_STEP = 0.005
 MOST_SAMPLES = 200_000
 
@@ -30,7 +34,9 @@ _COLUMNS = ("t", "rho", "alpha1", "alpha2", "v1", "u1", "v2", "u2")
 _POSE_COLUMNS = ("x", "y", "theta")
 
 
-def simulate(scenario: Scenario, out: Path | None, *, stability: bool = False) -> Simulation:
+def simulate(
+    scenario: Scenario, out: Path | None, *, stability: bool = False, figures: Kind | None = None
+) -> Simulation:
     """Run the scenario's law on the exact shape dynamics and report on it; with ``out``, write files there.
 
     The report is the JSON of ``abreast simulate``: ``final`` shape; ``orbit`` of the reduced system, absent
@@ -64,12 +70,12 @@ def simulate(scenario: Scenario, out: Path | None, *, stability: bool = False) -
     if (why := refusal(scenario)) is not None:
         report["orders_refused"] = why
     if out is not None:
-        _write(scenario, trajectory, orbit, out)
+        _write(scenario, trajectory, orbit, out, figures)
     if stability:
         found = stability_of(scenario, trajectory)
         report["stability"] = stability_json(found)
         if out is not None:
-            _write_stability(scenario, found, out)
+            _write_stability(scenario, found, out, figures)
     return Simulation(
         report,
         t=trajectory.t,
@@ -116,26 +122,43 @@ def _extremes(values: FloatArray) -> list[float]:
     return [float(values.min()), float(values.max())]
 
 
-def _write(scenario: Scenario, trajectory: Trajectory, orbit: PeriodicOrbit | None, out: Path) -> None:
+def _write(
+    scenario: Scenario,
+    trajectory: Trajectory,
+    orbit: PeriodicOrbit | None,
+    out: Path,
+    figures: Kind | None,
+) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
         _write_csv(trajectory, out / "trajectory.csv")
         with left_out_if_missing("simulation.png and no experiment.png"):
-            from hil.figures.simulation_figures import draw_experiment, draw_simulation
+            from hil.figures.paper_figures import write_paper_figures
+            from hil.figures.simulation_figures import (
+                draw_experiment,
+                draw_simulation,
+                simulation_paper_figures,
+            )
 
             draw_simulation(scenario, trajectory, orbit, out / "simulation.png")
             draw_experiment(scenario, trajectory, out / "experiment.png")
+            if figures:
+                single = simulation_paper_figures(scenario, trajectory, orbit)
+                write_paper_figures(single, out / "figures", figures)
     except OSError as error:
         raise UsageError(f"{out}: cannot be written ({error.strerror}); choose another --out") from error
 
 
-def _write_stability(scenario: Scenario, found: Stability, out: Path) -> None:
+def _write_stability(scenario: Scenario, found: Stability, out: Path, figures: Kind | None) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
         with left_out_if_missing("stability.png"):
-            from hil.figures.stability_figures import draw_stability
+            from hil.figures.paper_figures import write_paper_figures
+            from hil.figures.stability_figures import draw_stability, stability_paper_figures
 
             draw_stability(scenario, found, out / "stability.png")
+            if figures:
+                write_paper_figures(stability_paper_figures(scenario, found), out / "figures", figures)
     except OSError as error:
         raise UsageError(f"{out}: cannot be written ({error.strerror}); choose another --out") from error
 

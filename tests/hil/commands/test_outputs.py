@@ -161,3 +161,10 @@ def test_folders_of_one_second_are_told_apart(tmp_path: Path, monkeypatch: pytes
     assert made == ["pair-20250101-120000", "pair-20250101-120000-2", "pair-20250101-120000-3"]
     with pytest.raises(UsageError, match="cannot be made"):
         new_folder(LONG)
+
+
+@pytest.mark.parametrize("command", [("simulate",), ("replay", "run.mcap")])
+def test_figures_without_a_folder_are_refused(
+    capsys: pytest.CaptureFixture[str], command: tuple[str, ...]
+) -> None:
+    assert "--out DIR" in refused(capsys, *command, "--figures", "pdf")

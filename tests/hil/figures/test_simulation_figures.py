@@ -75,7 +75,7 @@ def test_limits_show_where_they_matter(axes: Axes, scenario: Scenario, trajector
     assert [0.22, 0.22] in heights(axes)
     assert [-0.22, -0.22] not in heights(axes)
     draw_turn_rate(axes, scenario, trajectory)
-    assert [-2.84, -2.84] in heights(axes)
+    assert [math.degrees(-2.84)] * 2 in heights(axes)
 
 
 @pytest.mark.slow
