@@ -18,15 +18,16 @@ _GOOD, _BOUND, _BAD = Colour(0.13, 0.55, 0.25), Colour(0.55, 0.25, 0.65), Colour
 # TurtleBot3 Burger: 0.138 m long, 0.178 m wide over its wheels, 0.192 m high.
 BODY, HEIGHT, WIDTH = 0.138, 0.192, 0.178
 _WHEEL_DIAMETER, _WHEEL_WIDTH = 0.066, 0.020
-_ABOVE = HEIGHT + 0.01
+_NOSE_Z, _ABOVE, _TEXT_Z = HEIGHT + 0.01, HEIGHT + 0.02, HEIGHT + 0.05
 AHEAD_S = 1.0
 """The estimated velocity is drawn as the way of so many seconds."""
 
 SDS = 3.0
 """Ellipses reach so many standard deviations."""
 
-_STATION_RADIUS = 0.02
-_TEXT = 0.035
+_STATION_RADIUS = 0.5 * WIDTH + 0.01  # around a robot that stands on it
+_STATION = Colour(0.93, 0.72, 0.10)
+_TEXT, _TEXT_ASIDE = 0.03, 0.17
 _MOST = 5.0  # m; nothing that is less certain than this is drawn
 
 
@@ -77,7 +78,7 @@ def robot_markers(brush: Brush, colour: Colour) -> Iterator[Marker]:
     aside = 0.5 * (WIDTH - _WHEEL_WIDTH)
     for number, y in enumerate((aside, -aside), 1):
         yield brush.wheel(number, (0.0, y), _WHEEL_DIAMETER, _WHEEL_WIDTH, _WHEEL)
-    yield brush.arrow(3, (-0.3 * BODY, 0.0), (0.45 * BODY, 0.0), _ABOVE, 0.018, Colour(1.0, 1.0, 1.0))
+    yield brush.arrow(3, (-0.3 * BODY, 0.0), (0.45 * BODY, 0.0), _NOSE_Z, 0.018, Colour(1.0, 1.0, 1.0))
 
 
 def pair_markers(brush: Brush, seen: SeenPair) -> Iterator[Marker]:
@@ -91,10 +92,15 @@ def pair_markers(brush: Brush, seen: SeenPair) -> Iterator[Marker]:
             yield from _motion(brush, leader, believed)
             yield from _station(brush, seen, believed)
         colour = _GOOD if believed.trusted else _BAD
-        yield brush.text(20, leader, _ABOVE + 0.12, _TEXT, _leader_text(seen.names[0], believed), colour)
-    yield brush.text(
-        21, follower, _ABOVE + 0.12, _TEXT, _follower_text(seen), _BAD if seen.stop else FOLLOWER
-    )
+        beside = _beyond(follower, leader)
+        yield brush.text(20, beside, _TEXT_Z, _TEXT, _leader_text(seen.names[0], believed), colour)
+    beside, colour = _beyond(leader, follower), _BAD if seen.stop else FOLLOWER
+    yield brush.text(21, beside, _TEXT_Z, _TEXT, _follower_text(seen), colour)
+
+
+def _beyond(other: Point, robot: Point) -> Point:
+    """Beside a robot, away from the other one: where neither is under a text, seen from above too."""
+    return on_ray(robot, math.atan2(robot[1] - other[1], robot[0] - other[0]), _TEXT_ASIDE)
 
 
 def _position(brush: Brush, leader: Point, follower: Point, believed: Believed) -> Iterator[Marker]:
@@ -123,9 +129,8 @@ def _station(brush: Brush, seen: SeenPair, believed: Believed) -> Iterator[Marke
     alpha2 = math.atan2(seen.station.sin, seen.station.cos)
     line = believed.theta + float(wrap(alpha2 - math.pi))
     place = on_ray(seen.leader[:2], line, seen.rho_0)
-    yield brush.line(5, circle(place, _STATION_RADIUS), 0.005, 0.004, FOLLOWER)
-    yield brush.line(6, (place, seen.follower[:2]), 0.005, 0.002, FOLLOWER.faint(0.6))
-    yield brush.text(22, place, 0.02, 0.6 * _TEXT, "station", FOLLOWER)
+    yield brush.line(5, circle(place, _STATION_RADIUS), 0.005, 0.005, _STATION)
+    yield brush.line(6, (place, seen.follower[:2]), _ABOVE, 0.004, _STATION)
 
 
 def _leader_text(name: str, believed: Believed) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+from foxglove import layouts
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
@@ -110,6 +111,25 @@ def test_every_path_of_the_foxglove_layout_leads_somewhere(folder: Path) -> None
         if path not in topics:
             assert isinstance(field_of(topics, path, "."), float | int | str | bool)
     assert layout["configById"]["3D!scene"]["followTf"] == "follower"
+
+
+def test_the_foxglove_layout_has_no_setting_that_foxglove_does_not_know(folder: Path) -> None:
+    """By the panels' settings in Foxglove's own SDK."""
+    known: dict[str, Any] = {
+        "Plot": layouts.PlotConfig(),
+        "StateTransitions": layouts.StateTransitionsConfig(),
+        "DiagnosticSummary": layouts.DiagnosticsSummaryConfig(),
+        "3D": layouts.ThreeDeeConfig(),
+    }
+    series = {"Plot": layouts.PlotSeries(), "StateTransitions": layouts.StateTransitionsSeries()}
+    layout = json.loads((folder / "foxglove.json").read_text())
+    for name, config in layout["configById"].items():
+        kind = name.partition("!")[0]
+        assert config.keys() - {"title"} <= known[kind]._to_dict().keys()
+        for path in config.get("paths", ()):
+            assert path.keys() <= series[kind]._to_dict().keys()
+    camera = layout["configById"]["3D!scene"]["cameraState"]
+    assert camera.keys() <= layouts.ThreeDeeCameraState()._to_dict().keys()
 
 
 def plotjuggler_curves(text: str) -> tuple[set[str], set[str]]:
