@@ -27,7 +27,7 @@ COMMANDS = {
     "compare": "runs, logs or sweeps beside each other: what differs, and which was better",
     "gains": "propose gains for a scenario, with the reason for each",
     "import": "turn other recordings into logs",
-    "export": "a log as tables for pandas, polars and others: estimates beside the truth, and every topic",
+    "export": "a log as tables for pandas and polars, or as a file for Foxglove and PlotJuggler",
     "calibrate": "find the offsets of a range and bearing sensor that mocap has watched",
     "recover": "make a log whole that was cut off or damaged",
     "doctor": "what is wrong in a lab before anything moves, and what to do about it",
@@ -48,7 +48,7 @@ COMMANDS = {
     "faults": "faults put into live runs on purpose, and whether robots stand for them",
     "soak": "a long live run: whether memory stays flat, cycles on time, and its log repeats",
     "secure": "keys by which a router knows who is who, and what each may do",
-    "bridge": "motion captures of others brought to the wire, as a daemon",
+    "bridge": "motion captures of others brought to the wire, and the wire to Foxglove, as a daemon",
 }
 _OF_NAMES = (errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.EACCES)
 """What is wrong with a name that was given, and not with the machine."""

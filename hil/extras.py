@@ -20,6 +20,7 @@ EXTRA_OF = {
     "pyarrow": "tables",
     "filterpy": "filterpy",
     "distributed": "cluster",
+    "foxglove": "foxglove",
     "motioncapture": "mocap",
     "cryptography": "secure",
     "geometry_msgs": "ros",

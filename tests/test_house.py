@@ -33,9 +33,9 @@ ROOMS = {
         "models", "own_motion", "time", "filters", "tracking", "bounds", "consistency", "calibration",
     ),
     "hil": (
-        "extensions", "scenario", "wire", "guard", "log", "nodes", "emulator", "lockstep", "live", "bridge",
-        "doctor", "replay", "recordings", "judge", "exports", "figures", "reports", "live_page", "sweep",
-        "compare", "simulate", "faults", "soak", "commands",
+        "extensions", "scenario", "wire", "guard", "log", "nodes", "emulator", "lockstep", "live", "scene",
+        "bridge", "doctor", "replay", "recordings", "judge", "exports", "figures", "reports", "live_page",
+        "sweep", "compare", "simulate", "faults", "soak", "commands",
     ),
 }  # fmt: skip
 """Rooms of the packages that have some, lower ones first: each may import those before it."""
@@ -221,12 +221,12 @@ def test_the_version_is_the_same_everywhere() -> None:
     assert hil.__version__ == project()["project"]["version"]
 
 
-def test_the_wheel_holds_the_packages_the_scenarios_and_the_maps(tmp_path: Path) -> None:
+def test_the_wheel_holds_the_packages_the_scenarios_the_maps_and_the_layouts(tmp_path: Path) -> None:
     (built,) = WheelBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])
     with zipfile.ZipFile(built) as wheel:
         held = {name for name in wheel.namelist() if ".dist-info/" not in name}
         records = {name.partition("/")[2] for name in wheel.namelist() if ".dist-info/" in name}
-    data = {f"hil/data/{path.parent.name}/{path.name}" for path in (ROOT / "data").glob("*/*.toml")}
+    data = {f"hil/data/{path.parent.name}/{path.name}" for path in (ROOT / "data").glob("*/*.*")}
     assert {name for name in held if name.startswith("hil/data/")} == data
     sources = {named(path) for path in MODULES} | {
         named(path) for path in (ROOT / "hil" / "wire" / "msg").rglob("*.msg")

@@ -1,4 +1,4 @@
-"""``abreast bridge``: motion captures of others, and ROS 2, brought to the wire."""
+"""``abreast bridge``: motion captures of others, and ROS 2, brought to the wire; the wire to Foxglove."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class _Given(TypedDict):
 
 @click.group("bridge", cls=CommandGroup)
 def command() -> None:
-    """Bring what other systems send to the wire."""
+    """Bring what other systems send to the wire, or the wire to viewers."""
 
 
 def _options() -> list[click.Parameter]:
@@ -102,6 +102,27 @@ def bridge_ros2(**given: Unpack[_Given]) -> None:
         given,
         "bridge",
     )
+
+
+@command.command("foxglove", params=_options())
+@click.option("--port", type=click.IntRange(0, 65535), default=8765, show_default=True, help="0: any free.")
+@click.option("--address", default="127.0.0.1", show_default=True, help="Others than loopback let all look.")
+def bridge_foxglove(port: int, address: str, **given: Unpack[_Given]) -> None:
+    """Serve what passes in the lab of SCENARIO to Foxglove or Lichtblick: topics, transforms, a 3D scene.
+
+    Whoever connects may look, and nothing else. docs/foxglove.md has the layout.
+    """
+    with collector_paused():
+        from hil.bridge.foxglove_bridge import FoxgloveBridge
+
+    chosen = load_scenario(given["scenario"], given["overrides"])
+
+    def serve(wire: Wire) -> Bridge:
+        bridge = FoxgloveBridge(wire, chosen, address, port)
+        _say(f"Foxglove finds it at {bridge.url}; layouts: abreast export --layouts DIR")
+        return bridge
+
+    _run(serve, chosen, given, "viewer")
 
 
 def _run(

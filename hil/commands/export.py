@@ -1,7 +1,8 @@
-"""``abreast export``: logs as tables for pandas, polars and spreadsheets, and for the viewers of others."""
+"""``abreast export``: logs as tables for pandas, polars and spreadsheets, or as files for viewers."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,7 @@ import click
 
 from formation.collector import collector_paused
 from hil.commands.outputs import OutputFolder
-from hil.errors import CheckFailedError
+from hil.errors import CheckFailedError, UsageError
 from hil.log.report_json import print_json, print_text, results_apart
 
 if TYPE_CHECKING:
@@ -18,13 +19,14 @@ if TYPE_CHECKING:
     from hil.judge.replayed import ReplayChoice
     from hil.log.reader import Log
 
-_FORMATS = ("csv", "parquet")
+_FORMATS = ("csv", "parquet", "foxglove")
 
 
 @click.command("export")
-@click.argument("log", type=click.Path(path_type=Path))
-@click.option("--to", "folder", required=True, type=OutputFolder(), metavar="DIR", help="Where it goes.")
+@click.argument("log", required=False, type=click.Path(path_type=Path))
+@click.option("--to", "folder", type=OutputFolder(), metavar="DIR", help="Where it goes.")
 @click.option("--format", "form", type=click.Choice(_FORMATS), help="[parquet, without pyarrow csv]")
+@click.option("--layouts", type=OutputFolder(), metavar="DIR", help="Write the viewers' layouts there.")
 @click.option("--overwrite", is_flag=True, help="Write over an export that is there already.")
 @click.option("--map", "chart", metavar="FILE", help="Names the topics of a log that is not abreast's.")
 @click.option("--leader", metavar="NAME", help="Name of the leader's body.")
@@ -35,9 +37,10 @@ _FORMATS = ("csv", "parquet")
 @results_apart()
 @collector_paused()
 def command(
-    log: Path,
-    folder: Path,
+    log: Path | None,
+    folder: Path | None,
     form: str | None,
+    layouts: Path | None,
     overwrite: bool,
     chart: str | None,
     leader: str | None,
@@ -48,9 +51,19 @@ def command(
 ) -> None:
     """Write LOG as tables: DIR/aligned, a row for each estimate, and DIR/topics, a table for each topic.
 
-    Estimates are those of the log; where it has none they are made as replay does. docs/export.md has all
-    columns.
+    With --format foxglove as DIR/foxglove.mcap for Foxglove, Lichtblick, RViz and PlotJuggler, with
+    transforms, a scene, and layouts. Estimates are those of the log; where it has none they are made as
+    replay does. docs/export.md has all columns, docs/foxglove.md the viewers.
     """
+    if layouts is not None:
+        from hil.exports.layouts import write_layouts
+
+        for path in write_layouts(layouts):
+            print_text(f"{path}\n")
+    if log is None or folder is None:
+        if layouts is None or log is not None or folder is not None:
+            raise UsageError("export: expected LOG and --to DIR, or --layouts DIR alone")
+        return
     from hil.judge.replayed import ReplayChoice
     from hil.log.opened import opened_log
 
@@ -62,7 +75,26 @@ def command(
         overrides=overrides,
         in_messages=True,
     )
-    _write_tables(opened_log(log), folder, form, choice, overwrite=overwrite, as_json=as_json)
+    write = _write_foxglove if form == "foxglove" else _write_tables
+    write(opened_log(log), folder, form, choice, overwrite=overwrite, as_json=as_json)
+
+
+def _write_foxglove(
+    log: Log, folder: Path, _form: str | None, choice: ReplayChoice, *, overwrite: bool, as_json: bool
+) -> None:
+    from hil.exports.foxglove_export import export_foxglove
+    from hil.exports.foxglove_file import FILE
+    from hil.exports.table_export import refuse_present
+
+    if not overwrite:
+        refuse_present(folder, [FILE])
+    done = export_foxglove(log, folder, choice)
+    _tell_left_out(done.left_out)
+    if as_json:
+        print_json(done.as_dict())
+    else:
+        print_text(f"{done.path}: {sum(done.messages.values())} messages on {len(done.messages)} topics\n")
+    _refuse_damage(log, done.damage)
 
 
 def _write_tables(
@@ -78,15 +110,24 @@ def _write_tables(
     chosen: Format = "csv" if form == "csv" or (form is None and not has_parquet()) else "parquet"
     done = export_tables(log, folder, chosen, choice)
     _tell(done, as_json=as_json)
-    if done.damage:
-        raise CheckFailedError(f"log {log.path}: {done.damage}")
+    _refuse_damage(log, done.damage)
+
+
+def _refuse_damage(log: Log, damage: str) -> None:
+    """Fail for what is gone of a log, now that the rest has been written."""
+    if damage:
+        raise CheckFailedError(f"log {log.path}: {damage}")
+
+
+def _tell_left_out(left_out: Mapping[str, str]) -> None:
+    for topic, why in left_out.items():
+        click.echo(f"topic {topic}: left out: {why}", err=True)
 
 
 def _tell(done: TableExport, *, as_json: bool) -> None:
     for topic, count in done.topics.malformed.items():
         click.echo(f"topic {topic}: {count} payloads are no message of its type, and left out", err=True)
-    for topic, why in done.topics.left_out.items():
-        click.echo(f"topic {topic}: left out: {why}", err=True)
+    _tell_left_out(done.topics.left_out)
     told: dict[str, Any] = done.as_dict()
     if as_json:
         print_json(told)

@@ -11,17 +11,13 @@ from hil.errors import UsageError
 from hil.exports.aligned_columns import ALIGNED_COLUMNS
 from hil.exports.aligned_table import aligned_rows
 from hil.exports.logged_run import LoggedRun, recorded_run, replayed_run
+from hil.exports.sources import of_what_is_whole, recorded_links
 from hil.exports.table_file import Format, table_file
 from hil.exports.topic_tables import TopicTables, write_topics
 from hil.judge.replayed import ReplayChoice, replayed
-from hil.log.metadata import scenario_of
-from hil.log.reader import DamagedLogError, Log
+from hil.log.reader import Log
 from hil.log.table_column import TableColumn
-from hil.log.unpacked import salvaged
-from hil.scenario.links import Link, link_of, links_of
-from hil.wire import message_types as msg
-from hil.wire.messages import typename_of
-from hil.wire.topics import link_topics
+from hil.scenario.links import Link
 
 TOPICS = "topics"
 """Folder of the tables of topics."""
@@ -71,17 +67,12 @@ def export_tables(log: Log, folder: Path, form: Format, choice: ReplayChoice) ->
     Estimates are those that the log has, unless ``choice`` asks for others or it has none: then they are made
     anew, as a replay does. Raises :class:`UsageError` for what cannot be replayed so or written.
     """
-    try:
-        return _export(log, folder, form, choice)
-    except DamagedLogError:
-        if log.damage or log.source is not None:
-            raise
-    return _export(salvaged(log.path), folder, form, choice)
+    return of_what_is_whole(log, lambda whole: _export(whole, folder, form, choice))
 
 
-def refuse_present(folder: Path) -> None:
+def refuse_present(folder: Path, names: Sequence[str] = ("aligned.csv", "aligned.parquet", TOPICS)) -> None:
     """Raise :class:`UsageError` for a folder in which an export lies already."""
-    there = [name for name in ("aligned.csv", "aligned.parquet", TOPICS) if (folder / name).exists()]
+    there = [name for name in names if (folder / name).exists()]
     if there:
         raise UsageError(
             f"{folder}: has {there[0]} already; give another folder, or overwrite it (--overwrite)"
@@ -89,7 +80,7 @@ def refuse_present(folder: Path) -> None:
 
 
 def _export(log: Log, folder: Path, form: Format, choice: ReplayChoice) -> TableExport:
-    links = _recorded_links(log, choice)
+    links = recorded_links(log, choice)
     done = TableExport(folder, form, "recorded" if links else "replayed", damage=log.damage)
     with table_file(folder / f"aligned.{form}", ALIGNED_COLUMNS, form) as table:
         for run in _runs(log, links, choice):
@@ -100,16 +91,6 @@ def _export(log: Log, folder: Path, form: Format, choice: ReplayChoice) -> Table
         _describe(folder / COLUMNS)
     done.topics = write_topics(log, folder / TOPICS, form)
     return done
-
-
-def _recorded_links(log: Log, choice: ReplayChoice) -> Sequence[Link]:
-    """Followers whose estimates the log has as they are wanted, none if they are to be made anew."""
-    own = scenario_of(log)
-    if own is None or choice.chart or choice.estimator or choice.leader or choice.overrides:
-        return ()
-    links = links_of(own) if choice.follower is None else (link_of(own, choice.follower),)
-    made = [log.topics.get(link_topics(link).estimate) == typename_of(msg.LeaderEstimate) for link in links]
-    return links if any(made) else ()
 
 
 def _runs(log: Log, links: Sequence[Link], choice: ReplayChoice) -> Iterator[LoggedRun]:

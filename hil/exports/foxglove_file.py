@@ -1,0 +1,137 @@
+"""A log as a file for viewers: its messages under ROS names, with transforms and a scene beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mcap.writer import Writer
+
+from hil.errors import UsageError
+from hil.log.reader import Log
+from hil.log.written_aside import written_aside
+from hil.nodes.node import Outgoing
+from hil.scenario.schema import Scenario
+from hil.scene.lab_scene import LabScene
+from hil.wire.messages import definition
+
+FILE = "foxglove.mcap"
+
+
+@dataclass(slots=True)
+class FoxgloveExport:
+    """What was written. ``messages``: by topic; ``left_out``: topics that no viewer could read, with why."""
+
+    path: Path
+    messages: dict[str, int] = field(default_factory=dict)
+    left_out: dict[str, str] = field(default_factory=dict)
+    damage: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same as JSON."""
+        return {
+            "file": str(self.path),
+            "messages": self.messages,
+            "left_out": self.left_out,
+            "damage": self.damage or None,
+        }
+
+
+def write_foxglove(
+    log: Log, scenario: Scenario, path: Path, made: Iterable[Outgoing] = (), *, told: bool = True
+) -> FoxgloveExport:
+    """Write all messages of a log, and what the scene of a scenario is, in the order of log time.
+
+    ``made``: messages besides, by their stamps in log time, for the scene; those on topics that the log lacks
+    are written too. ``told``: whether the log's own topics are those of the scenario. Raises
+    :class:`UsageError` for a damaged log, or if the file cannot be written.
+    """
+    done = FoxgloveExport(path, damage=log.damage)
+    scene = LabScene(scenario)
+    own = {ros_name(topic) for topic in log.topics}
+    besides = iter(made)
+    with _mcap(path) as writer:
+        channels = _Channels(writer, log.definitions, done)
+        waiting = next(besides, None)
+        for record in log.records(_readable(log, done)):
+            while waiting is not None and waiting.stamp_ns <= record.log_ns:
+                if ros_name(waiting.topic) not in own:
+                    channels.add(waiting.topic, waiting.typename, waiting.payload, waiting.stamp_ns)
+                channels.add_all(scene.hear(waiting.topic, waiting.payload, waiting.stamp_ns))
+                waiting = next(besides, None)
+            channels.add(record.topic, record.typename, record.payload, record.log_ns, record.publish_ns)
+            if told:
+                channels.add_all(scene.hear(record.topic, record.payload, record.log_ns))
+    return done
+
+
+def ros_name(topic: str) -> str:
+    """A topic under its ROS name, which viewers want: with a leading slash."""
+    return topic if topic.startswith("/") else f"/{topic}"
+
+
+def _readable(log: Log, done: FoxgloveExport) -> list[str]:
+    readable = []
+    for topic, typename in log.topics.items():
+        try:
+            log.check_encodings([topic])
+            _definition(log.definitions, typename)
+        except UsageError as error:
+            done.left_out[topic] = str(error).partition(": ")[2] or str(error)
+            continue
+        readable.append(topic)
+    return readable
+
+
+def _definition(definitions: Mapping[str, str], typename: str) -> str:
+    return definitions.get(typename) or definition(typename)
+
+
+class _Channels:
+    """Topics of a file, declared as they come."""
+
+    def __init__(self, writer: Any, definitions: Mapping[str, str], done: FoxgloveExport) -> None:
+        self._writer, self._definitions, self._done = writer, definitions, done
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[tuple[str, str], int] = {}
+
+    def add(
+        self, topic: str, typename: str, payload: bytes, log_ns: int, publish_ns: int | None = None
+    ) -> None:
+        """Append a message."""
+        channel = self._channels.get((topic, typename))
+        if channel is None:
+            channel = self._declared(topic, typename)
+        self._writer.add_message(channel, log_ns, payload, log_ns if publish_ns is None else publish_ns)
+        self._done.messages[ros_name(topic)] = self._done.messages.get(ros_name(topic), 0) + 1
+
+    def add_all(self, messages: Iterator[Outgoing]) -> None:
+        """Append what is due now."""
+        for each in messages:
+            self.add(each.topic, each.typename, each.payload, each.stamp_ns)
+
+    def _declared(self, topic: str, typename: str) -> int:
+        if typename not in self._schemas:
+            text = _definition(self._definitions, typename).encode()
+            self._schemas[typename] = self._writer.register_schema(typename, "ros2msg", text)
+        channel: int = self._writer.register_channel(ros_name(topic), "cdr", self._schemas[typename])
+        self._channels[topic, typename] = channel
+        return channel
+
+
+@contextmanager
+def _mcap(path: Path) -> Iterator[Any]:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with written_aside(path) as aside, aside.open("wb") as stream:
+            writer: Any = Writer(stream)
+            writer.start(profile="ros2", library="abreast")
+            yield writer
+            writer.finish()
+    except OSError as error:
+        raise UsageError(
+            f"{path}: cannot be written ({error.strerror or error}); give another place"
+        ) from None

@@ -1,0 +1,1 @@
+"""What a lab looks like in a 3D panel: transforms and markers."""

@@ -1,0 +1,150 @@
+"""The newest of what was heard of a follower and its leader."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from estimation.tracking.tracker import Status
+from formation.mount import robot_pose
+from formation.pose import Pose
+from formation.station import Side, Station
+from hil.scenario.leader_model import follower_mount, leader_mount, pose_noise
+from hil.scenario.links import Link
+from hil.scenario.parts import station
+from hil.scene.pair_scene import Believed, SeenPair
+from hil.wire import message_types as msg
+from hil.wire import topics
+from hil.wire.message_checks import planar
+from hil.wire.messages import decode_as, to_ns
+from hil.wire.pose_sources import places_of
+from hil.wire.records import Placement
+from hil.wire.topics import link_topics
+
+_KEPT = 128
+
+
+class PairState:
+    """Hears a follower and its leader. ``topics``: what of."""
+
+    def __init__(self, link: Link) -> None:
+        self.link = link
+        self._names = link_topics(link)
+        self.topics = frozenset(
+            {
+                topics.RIGID_BODIES,
+                topics.DIAGNOSTICS,
+                self._names.estimate,
+                self._names.command,
+                self._names.odom,
+            }
+        )
+        scenario = link.scenario
+        self._mounts = (leader_mount(scenario), follower_mount(scenario))
+        self._station = station(scenario)
+        self._sigma_position = pose_noise(scenario).position
+        self._estimate: msg.LeaderEstimate | None = None
+        self._command: msg.Command | None = None
+        self._headings: dict[int, float] = {}
+        self._framed = False
+
+    def note_frame(self, stamp_ns: int, seen: Mapping[str, Placement]) -> dict[str, Pose]:
+        """Take a frame's bodies in: where the robots on them stand."""
+        found: dict[str, Pose] = {}
+        names = (self.link.leader, self.link.follower)
+        for name, body, mount in zip(names, self.link.bodies, self._mounts, strict=True):
+            if (place := seen.get(body)) is not None and (pose := _pose_of(place)) is not None:
+                found[name] = robot_pose(pose, mount)
+        if self.link.follower in found:
+            self._framed = True
+            self._headings[stamp_ns] = found[self.link.follower].theta
+            if len(self._headings) > _KEPT:
+                self._headings.pop(next(iter(self._headings)))
+        return found
+
+    def note(self, topic: str, payload: bytes) -> dict[str, Pose]:
+        """Take in what else is heard; where robots stand by that, where no frame tells it."""
+        names = self._names
+        if topic == names.estimate:
+            self._estimate = decode_as(payload, msg.LeaderEstimate)
+        elif topic == names.command:
+            self._command = decode_as(payload, msg.Command)
+        elif topic == topics.DIAGNOSTICS:
+            self._note_report(decode_as(payload, msg.DiagnosticArray))
+        elif topic == names.odom and not self._framed and self._estimate is not None:
+            # Where there are estimates and still no frames, nobody but the robot itself tells where it is.
+            odometry = decode_as(payload, msg.Odometry)
+            (place,) = places_of(odometry)
+            pose = _pose_of(place.place)
+            return {} if pose is None else {self.link.follower: pose, **self._led_from(pose)}
+        return {}
+
+    def _note_report(self, report: msg.DiagnosticArray) -> None:
+        told = {each.name: {pair.key: pair.value for pair in each.values} for each in report.status}
+        estimator = told.get(f"abreast/{self.link.node_name('estimator')}", {})
+        self._sigma_position = float(estimator.get("noise.sigma_position", self._sigma_position))
+        controller = told.get(f"abreast/{self.link.node_name('controller')}", {})
+        if (side := controller.get("side")) is not None:
+            self._station = Station(Side(side), self.link.scenario.formation.bearing)
+
+    def _led_from(self, follower: Pose) -> dict[str, Pose]:
+        """Where the leader stands by the estimate, seen from the follower."""
+        told = self._estimate
+        if told is None or not math.isfinite(told.rho + told.alpha2 + told.alpha1):
+            return {}
+        line = follower.theta + told.alpha2
+        at = follower.x + told.rho * math.cos(line), follower.y + told.rho * math.sin(line)
+        return {self.link.leader: Pose(*at, line + math.pi - told.alpha1)}
+
+    def seen(self, now_ns: int, stands: Mapping[str, Pose]) -> SeenPair | None:
+        """What there is to draw of the pair, None before both have been seen."""
+        names = (self.link.leader, self.link.follower)
+        if not stands.keys() >= set(names):
+            return None
+        leader, follower = (stands[name] for name in names)
+        command = self._command
+        return SeenPair(
+            now_ns,
+            names,
+            leader,
+            follower,
+            self.link.scenario.formation.rho_0,
+            self._station,
+            self._believed(follower),
+            None if command is None else (command.v2, command.u2),
+            "" if command is None else command.stop,
+        )
+
+    def _believed(self, follower: Pose) -> Believed | None:
+        told = self._estimate
+        if told is None or not math.isfinite(told.rho + told.alpha2 + told.alpha1 + told.v1):
+            return None
+        # The heading of its very capture: the robot has turned since.
+        heading = self._headings.get(to_ns(told.header.stamp), follower.theta)
+        variances = told.covariance[::6]
+        status = Status(told.status)
+        along, across = self._position_sds(told)
+        return Believed(
+            theta=heading + told.alpha2 + math.pi - told.alpha1,
+            alpha1=told.alpha1,
+            v1=told.v1,
+            sd_v1=math.sqrt(max(0.0, float(variances[2]))),
+            sd_alpha1=math.sqrt(max(0.0, float(variances[3]))),
+            bound_v1=told.bound_v1,
+            bound_alpha1=told.bound_alpha1,
+            sd_along=along,
+            sd_across=across,
+            trusted=status == Status.TRACKING,
+            says=status.name.lower(),
+        )
+
+    def _position_sds(self, told: msg.LeaderEstimate) -> tuple[float, float]:
+        given = self.link.scenario.estimator
+        if given.front_end == "body":
+            return given.sigma_range, given.sigma_bearing * told.rho
+        return self._sigma_position, self._sigma_position
+
+
+def _pose_of(place: Placement) -> Pose | None:
+    """Pose on the floor, None of a body that is nowhere."""
+    return planar(place) if all(map(math.isfinite, place)) else None
