@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from hil.errors import AbreastError
+from hil.extras import needs_extra
 from hil.nodes.node import Outgoing
 from hil.scenario.schema import Scenario
 from hil.scene.lab_scene import TYPES, LabScene

@@ -41,7 +41,7 @@ _LEADER, _FOLLOWER = Touched.LEADER.value, Touched.FOLLOWER.value
 
 
 class Fault(NamedTuple):
-    """A fault from ``at_s`` after the leader set off; see :class:`hil.scenario.schema.FaultSection`."""
+    """A fault from ``at_s`` after the leader set off; see :class:`hil.scenario.emulated.FaultSection`."""
 
     kind: int
     body: int

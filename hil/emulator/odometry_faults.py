@@ -43,7 +43,7 @@ COMMANDS = OdometryFaultKind.COMMANDS.value
 
 
 class OdometryFault(NamedTuple):
-    """A fault from ``at_s`` after the leader set off; see :class:`~hil.scenario.schema.OdometryFaultSection`.
+    """A fault from ``at_s`` after the leader set off: :class:`~hil.scenario.emulated.OdometryFaultSection`.
 
     ``end_s``: when it is over, infinite for one that lasts.
     """

@@ -60,8 +60,8 @@ def source_type(typename: str) -> SourceType | None:
 def places_in(kind: SourceType, payload: bytes | memoryview, body: str = "") -> list[NamedPlace]:
     """What a message tells of bodies. ``body``: whose it is, where the topic says it and not the message.
 
-    Raises :class:`MalformedPayloadError` for a payload that is no message of that type, or has a stamp that
-    no clock gives.
+    Raises :class:`hil.wire.messages.MalformedPayloadError` for a payload that is no message of that type, or
+    has a stamp that no clock gives.
     """
     return places_of(decode_as(payload, MESSAGES[kind]), body)
 

@@ -1,4 +1,4 @@
-"""Every command of the docs is one: its options are read; where no lab is needed it is run as it stands."""
+"""Every command of the docs is one: its options are read, and where no lab is needed it is run."""
 
 from __future__ import annotations
 
@@ -151,9 +151,8 @@ def test_the_commands_of_a_page_run_in_their_order(page: Path, tmp_path: Path) -
                 if block.marker == "daemons":
                     started.begin(line)
                 elif not LAB.search(line):
-                    run(
-                        finite(line, started.router if started.running else ""), tmp_path, placed(block, line)
-                    )
+                    router = started.router if started.running else ""
+                    run(finite(line, router), tmp_path, placed(block, line))
 
 
 def run(line: str, folder: Path, where: str) -> None:

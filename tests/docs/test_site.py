@@ -5,12 +5,17 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from selenium.webdriver import Chrome
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.ui import WebDriverWait
 
 from docs import command_page
 from hil.command_line import abreast
+from tests.hil.reports.open_page import PATIENCE
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAGES = sorted((ROOT / "docs").glob("*.md"))
@@ -63,3 +68,29 @@ def test_every_page_stands_in_the_navigation_once(page: str) -> None:
 def test_the_page_of_commands_is_what_the_commands_say() -> None:
     written = command_page.written(abreast, "abreast")
     assert command_page.PAGE.read_text(encoding="utf-8") == written, "run scripts/docs"
+
+
+@pytest.fixture
+def phone(browser: Chrome) -> Iterator[Chrome]:
+    """The browser with a screen of 390 by 844 pixels."""
+    screen = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
+    yield browser
+    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_no_page_is_wider_than_a_phone(site: Path, phone: Chrome) -> None:
+    wide = {}
+    for page in sorted(site.rglob("*.html")):
+        phone.get(page.as_uri())
+        width = phone.execute_script("return document.documentElement.scrollWidth")
+        if width > 390:
+            wide[page.name] = width
+    assert not wide
+
+
+def test_the_search_finds_a_key_without_a_server(site: Path, browser: Chrome) -> None:
+    browser.get(f"{(site / 'search.html').as_uri()}?q=mount_check")
+    WebDriverWait(browser, PATIENCE).until(lambda page: page.find_elements(By.CSS_SELECTOR, ".search li a"))
+    found = {each.text for each in browser.find_elements(By.CSS_SELECTOR, ".search li a")}
+    assert any("Every key of a scenario" in title for title in found), found
