@@ -11,7 +11,7 @@ from formation.collector import collector_paused
 from hil.commands.outputs import OutputFile, OutputFolder
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
-from hil.extras import why_interpreted
+from hil.extras import begin_to_judge
 from hil.log.report_json import print_json, print_text, results_apart
 from hil.reports.judged_log import leave, made_folder
 
@@ -70,6 +70,8 @@ def command(
     """
     from hil.log.opened import opened_log
 
+    if not propose:
+        begin_to_judge("replay")
     # First of all: what replays takes over a second to load, and to compile where that is still to be done.
     given = opened_log(log)
     if propose:
@@ -82,8 +84,6 @@ def command(
     from hil.judge.replayed import ReplayChoice, chain_in, replayed
     from hil.judge.summary_text import print_summary
 
-    if why := why_interpreted():
-        click.echo(f"abreast replay: interpreted, as {why}: a verdict takes minutes", err=True)
     choice = ReplayChoice(
         estimator=estimator,
         law=law,

@@ -16,7 +16,7 @@ from hil.commands.outputs import OutputFolder, new_folder
 from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import DURATION, Seconds
 from hil.errors import AbreastError, CheckFailedError, InterruptedRunError, UsageError
-from hil.extras import why_interpreted
+from hil.extras import begin_to_judge
 from hil.judge.made_by import law_failure
 from hil.live.crew import Crew
 from hil.log.report_json import print_json, results_apart
@@ -100,6 +100,7 @@ def command(
     **live: Any,
 ) -> None:
     """Drive SCENARIO (a shipped name or a TOML file) through the whole chain, log it and judge it."""
+    begin_to_judge("run")
     how = _how(**live)
     given = {"run.duration_s": duration, "run.seed": seed, "estimator.kind": estimator, "controller.law": law}
     options = [f"{key}={value}" for key, value in given.items() if value is not None]
@@ -114,8 +115,6 @@ def command(
     if how is not None and (emulated := chosen.source.emulated):
         refuse_chain(chosen, "--emulate is for a pair: leave it out")
         how = replace(how, crew=replace(how.crew, emulate=emulated))
-    if why := why_interpreted():
-        click.echo(f"abreast run: interpreted, as {why}: a verdict takes minutes", err=True)
     load_own_parts(chosen)
     folder = _folder(chosen, out)
     with claimed(folder):
