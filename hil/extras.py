@@ -65,6 +65,17 @@ def why_interpreted() -> str:
     return "ABREAST_INTERPRETED is set" if find_spec("numba") else "numba is not installed"
 
 
+def begin_to_judge(command: str) -> None:
+    """Say on stderr that a command which judges runs will be slow, where nothing is compiled.
+
+    Raises :class:`UsageError` where daemons alone are installed, before anything drives.
+    """
+    if find_spec("scipy") is None:
+        raise needs_extra(command, ModuleNotFoundError(name="scipy"))
+    if why := why_interpreted():
+        print(f"abreast {command}: interpreted, as {why}: it takes minutes", file=sys.stderr)  # noqa: T201
+
+
 @contextmanager
 def left_out_if_missing(what: str) -> Iterator[None]:
     """Go on without ``what`` where the extra that makes it is not installed, and say so on stderr.

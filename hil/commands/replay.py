@@ -13,7 +13,7 @@ from hil.commands.outputs import OutputFile, OutputFolder
 from hil.commands.replay_folder import refuse_for_folder, replay_folder
 from hil.commands.seconds import Seconds
 from hil.errors import CheckFailedError, UsageError
-from hil.extras import why_interpreted
+from hil.extras import begin_to_judge
 from hil.log.report_json import note, print_json, print_text, results_apart, say
 from hil.reports.judged_log import leave, made_folder, results_in
 
@@ -91,6 +91,8 @@ def command(
     many = is_folder_of_logs(log)
     if not many and (workers or scheduler):
         raise UsageError(f"log {log}: is a single log; --workers and --scheduler are for a folder of logs")
+    if not propose:
+        begin_to_judge("replay")
     # First of all: what replays takes over a second to load, and to compile where that is still to be done.
     if many:
         refuse_for_folder(log, {"--csv": table, "--propose-map": propose})
@@ -105,8 +107,6 @@ def command(
     from hil.judge.replayed import ReplayChoice, chain_in, replayed
     from hil.judge.summary_text import print_summary
 
-    if why := why_interpreted():
-        note(f"abreast replay: interpreted, as {why}: a verdict takes minutes")
     choice = ReplayChoice(
         estimator=estimator,
         law=law,

@@ -19,7 +19,7 @@ from hil.commands.page_options import PagePlace, page_options, page_place, shown
 from hil.commands.seconds import DURATION, Seconds
 from hil.commands.whole_numbers import Whole
 from hil.errors import AbreastError, CheckFailedError, InterruptedRunError, UsageError
-from hil.extras import why_interpreted
+from hil.extras import begin_to_judge
 from hil.live.crew import Crew
 from hil.log.report_json import note, print_json, results_apart, say
 from hil.reports.judged_log import claimed, judge_log, made_folder, results_in
@@ -107,6 +107,7 @@ def command(
 ) -> None:
     """Drive SCENARIO (a shipped name or a TOML file) through the whole chain, log it and judge it."""
     place = page_place(live)
+    begin_to_judge("run")
     how = _how(**live)
     given = {"run.duration_s": duration, "run.seed": seed, "estimator.kind": estimator, "controller.law": law}
     options = [f"{key}={value}" for key, value in given.items() if value is not None]
@@ -123,8 +124,6 @@ def command(
         how = replace(how, crew=replace(how.crew, emulate=emulated))
     if how is not None:
         how = replace(how, page=place)
-    if why := why_interpreted():
-        note(f"abreast run: interpreted, as {why}: a verdict takes minutes")
     load_own_parts(chosen)
     folder = _folder(chosen, out)
     with claimed(folder):

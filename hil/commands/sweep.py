@@ -14,8 +14,8 @@ from hil.commands.own_parts import load_own_parts
 from hil.commands.seconds import Seconds
 from hil.commands.whole_numbers import Whole
 from hil.errors import CheckFailedError, UsageError
-from hil.extras import why_interpreted
-from hil.log.report_json import note, print_json, results_apart, say
+from hil.extras import begin_to_judge
+from hil.log.report_json import print_json, results_apart, say
 from hil.reports.judged_log import results_in
 from hil.sweep.spec import Sweep, load_sweep
 
@@ -64,6 +64,7 @@ def command(
 
     Given the same --out again, a sweep that was interrupted goes on. Cells and runs count from 0.
     """
+    begin_to_judge("sweep")
     from hil.sweep.failed_laws import law_failure
     from hil.sweep.kept_runs import keep_run, worst_runs
     from hil.sweep.results import write_results
@@ -74,8 +75,6 @@ def command(
     sweep = load_sweep(spec, overrides, runs=runs, seed=seed, duration_s=duration, estimators=names)
     for point in sweep.cells()[: len(sweep.spec.estimators)]:
         load_own_parts(sweep.scenario_of(point))
-    if why := why_interpreted():
-        note(f"abreast sweep: interpreted, as {why}: a run takes minutes")
     to_keep = [_parsed(sweep, text) for text in kept if text != "worst"]
     folder = out or new_folder("sweep")
     result = _fly(sweep, folder, workers or len(os.sched_getaffinity(0)), scheduler)

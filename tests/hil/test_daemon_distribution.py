@@ -57,11 +57,14 @@ def test_a_daemon_does_without_and_says_once_that_it_is_interpreted(name: str, t
     assert "interpreted" not in "".join(rest)
 
 
-def test_what_needs_the_rest_says_in_one_line_what_brings_it() -> None:
-    command = [sys.executable, "-c", WITHOUT, MISSING, "simulate", "turtlebot3"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+@pytest.mark.parametrize("name", ["simulate", "run", "replay"])
+def test_what_needs_the_rest_says_in_one_line_what_brings_it(name: str, tmp_path: Path) -> None:
+    log = [str(tmp_path)] if name == "replay" else []
+    command = [sys.executable, "-c", WITHOUT, MISSING, name, *log]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (
         2,
-        "abreast: simulate: needs scipy, which is not installed; "
+        f"abreast: {name}: needs scipy, which is not installed; "
         "pip install abreast in an environment that has no abreast-daemon\n",
     )
+    assert not list(tmp_path.iterdir())
