@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from hil.commands.progress import doing
 from hil.log.report_json import print_json, result_console
 from hil.scenario.files import load_scenario
 
@@ -17,9 +18,11 @@ def command(scenario: str, overrides: tuple[str, ...], as_json: bool) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from hil.scenario.certificate import certificate_json, certificate_lines, certificate_of
+    chosen = load_scenario(scenario, overrides)
+    with doing("certifying"):
+        from hil.scenario.certificate import certificate_json, certificate_lines, certificate_of
 
-    certificate = certificate_of(load_scenario(scenario, overrides))
+        certificate = certificate_of(chosen)
     if as_json:
         print_json(certificate_json(certificate))
         return

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from hil.commands.progress import doing
 from hil.commands.seconds import Seconds
 from hil.errors import UsageError
 from hil.log.report_json import print_with_nulls, say
@@ -58,16 +59,10 @@ def command(
     --from and --to are seconds since the first sighting or, for the timing, the first odometry; for imported
     recordings the source's own time.
     """
-    from hil.log.opened import opened_log
-    from hil.replay.lab_calibration import calibration_of, calibration_of_foreign
-    from hil.replay.topic_map import load_topic_map
-
     if from_s is not None and to_s is not None and to_s <= from_s:
         raise UsageError(f"--to {to_s:g}: expected more than --from {from_s:g}")
-    if chart is not None:
-        found = calibration_of_foreign(opened_log(log), load_topic_map(chart, None, follower), from_s, to_s)
-    else:
-        found = calibration_of(opened_log(log), follower, from_s, to_s)
+    with doing("calibrating"):
+        found = _found(log, follower, chart, from_s, to_s)
     _say_timing(found)
     _say_odometry(found.odometry)
     if found.offsets is not None:
@@ -76,6 +71,19 @@ def command(
     _say_noise(found.noise)
     if as_json:
         print_with_nulls(found.as_dict())
+
+
+def _found(
+    log: Path, follower: str | None, chart: str | None, from_s: float | None, to_s: float | None
+) -> Calibration:
+    """What a log tells; ``chart``: topic map of one that is not abreast's."""
+    from hil.log.opened import opened_log
+    from hil.replay.lab_calibration import calibration_of, calibration_of_foreign
+    from hil.replay.topic_map import load_topic_map
+
+    if chart is None:
+        return calibration_of(opened_log(log), follower, from_s, to_s)
+    return calibration_of_foreign(opened_log(log), load_topic_map(chart, None, follower), from_s, to_s)
 
 
 def _say_mounts(found: Mounts) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hil.commands.progress import doing
 from hil.errors import CheckFailedError
 from hil.extras import left_out_if_missing
 from hil.judge.chain_pairs import driven_trajectory
@@ -27,9 +28,10 @@ if TYPE_CHECKING:
 
 def judge_run(log: Log, scenario: Scenario, folder: Path, figures: Kind | None = None) -> dict[str, Any]:
     """Judge the log of a run, and leave summary and picture beside it."""
-    runs = [run_data_of_link(log, link) for link in links_of(scenario)]
-    summary = summarise_chain(scenario, runs)
-    _write(scenario, runs, summary, folder, "run.png", figures)
+    with doing("judging"):
+        runs = [run_data_of_link(log, link) for link in links_of(scenario)]
+        summary = summarise_chain(scenario, runs)
+        _write(scenario, runs, summary, folder, "run.png", figures)
     print_chain(summary)
     say(results_in(folder))
     say(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from hil.commands.progress import doing
 from hil.log.report_json import print_json, say
 from hil.scenario.files import load_scenario
 
@@ -14,9 +15,11 @@ from hil.scenario.files import load_scenario
 @click.option("--json", "as_json", is_flag=True, help="Print the proposal as one JSON object.")
 def command(scenario: str, overrides: tuple[str, ...], as_json: bool) -> None:
     """Propose gains for SCENARIO, and say for each what bounds it; or say why none work."""
-    from hil.simulate.gain_proposal import propose, report_lines
+    chosen = load_scenario(scenario, overrides)
+    with doing("looking for gains"):
+        from hil.simulate.gain_proposal import propose, report_lines
 
-    proposal = propose(load_scenario(scenario, overrides))
+        proposal = propose(chosen)
     if as_json:
         print_json(proposal.as_dict())
         return

@@ -10,6 +10,7 @@ import click
 
 from hil.commands.command_group import CommandGroup
 from hil.commands.outputs import OutputFile, refuse_unwritable
+from hil.commands.progress import doing
 from hil.commands.whole_numbers import Whole
 from hil.errors import AbreastError, UsageError
 from hil.log.report_json import note, say
@@ -67,7 +68,9 @@ def import_table(
     log = out or Path(f"{recording.stem}.mcap")
     refuse_unwritable(log, "--out")
     used = _chart(recording.stem, chart, scenario, overrides)
-    _tell(str(recording), log, import_recording(recording, used, log, leader, follower))
+    with doing("importing"):
+        done = import_recording(recording, used, log, leader, follower)
+    _tell(str(recording), log, done)
 
 
 @command.command("tum")
@@ -88,7 +91,9 @@ def import_tum_pair(
     log = out or Path(f"{leader.stem}_{follower.stem}.mcap")
     refuse_unwritable(log, "--out")
     used = _chart(log.stem, chart, scenario, overrides)
-    _tell(f"{leader}, {follower}", log, import_tum(leader, follower, used, log))
+    with doing("importing"):
+        done = import_tum(leader, follower, used, log)
+    _tell(f"{leader}, {follower}", log, done)
 
 
 def _chart(name: str, chart: str | None, scenario: str | None, overrides: tuple[str, ...]) -> ColumnMap:
@@ -135,7 +140,8 @@ def import_mrclam_pair(
     """Turn two robots of the UTIAS multi-robot data set in FOLDER into a log."""
     from hil.recordings.mrclam_import import import_mrclam
 
-    done = import_mrclam(folder, leader, follower, out, sightings)
+    with doing("importing"):
+        done = import_mrclam(folder, leader, follower, out, sightings)
     kind = "frames" if sightings == "vicon" else "sightings"
     say(
         f"{out}: {done.rows} {kind} from {done.from_s:.3f} s to {done.to_s:.3f} s; "

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hil.commands.outputs import OutputFile
+from hil.commands.progress import doing
 from hil.errors import CheckFailedError
 from hil.log.report_json import print_json, say
 
@@ -26,7 +27,8 @@ def command(log: Path, out: Path, as_json: bool) -> None:
     """
     from hil.log.recovery import recover
 
-    done = recover(log, out)
+    with doing("copying what is whole"):
+        done = recover(log, out)
     say(f"{out}: {done.messages} messages, {done.bytes} bytes; {log} {_said(done)}")
     if as_json:
         print_json(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,16 +11,18 @@ import click
 from formation.collector import collector_paused
 from hil.commands.figures_option import figures_option, refuse_nowhere
 from hil.commands.outputs import OutputFile, OutputFolder
+from hil.commands.progress import READY, doing, progress
 from hil.commands.replay_folder import refuse_for_folder, replay_folder
 from hil.commands.seconds import Seconds
-from hil.errors import CheckFailedError, UsageError
+from hil.errors import CheckFailedError, InterruptedRunError, UsageError
 from hil.extras import begin_to_judge
+from hil.live.interrupts import Interrupt
 from hil.log.report_json import note, print_json, print_text, results_apart, say
 from hil.reports.judged_log import leave, made_folder, results_in
 
 if TYPE_CHECKING:
     from hil.figures.paper_figures import Kind
-    from hil.judge.replayed import Replayed
+    from hil.judge.replayed import ReplayChoice, Replayed
     from hil.judge.run_data import RunData
     from hil.log.reader import Log
     from hil.scenario.schema import Scenario
@@ -103,10 +106,12 @@ def command(
         print_text(proposed_map(given, leader, follower))
         return
 
-    from hil.judge.replay_verdict import print_fed, violated_bounds
-    from hil.judge.replayed import ReplayChoice, chain_in, replayed
-    from hil.judge.summary_text import print_summary
+    with doing(READY):
+        from hil.judge.replay_verdict import print_fed, violated_bounds
+        from hil.judge.replayed import ReplayChoice, chain_in
+        from hil.judge.summary_text import print_summary
 
+    interrupt = Interrupt()
     choice = ReplayChoice(
         estimator=estimator,
         law=law,
@@ -126,11 +131,12 @@ def command(
         from hil.commands.chain_results import leave_replay
 
         _refuse_table(table, chain)
-        done = replayed(given, choice)
+        done = _followed(given, choice, interrupt)
         leave_replay(given, done, out, figures, as_json=as_json, verify=verify, strict=strict)
+        _refuse_interrupted(interrupt)
         _refuse_damage(given, done)
         return
-    done = replayed(given, choice)
+    done = _followed(given, choice, interrupt)
     (played,), (run_data,), summary = done.played, done.runs, done.summary
     print_fed(given, played)
     _write(run_data, summary, table, out, figures)
@@ -150,7 +156,27 @@ def command(
     if strict and (broken := violated_bounds(summary)):
         counts = ", ".join(f"{name} by {count}" for name, count in broken.items())
         raise CheckFailedError(f"log {log}: bounds violated (samples): {counts}")
+    _refuse_interrupted(interrupt)
     _refuse_damage(given, done)
+
+
+def _followed(log: Log, choice: ReplayChoice, interrupt: Interrupt) -> Replayed:
+    """The replay, with its progress; of one that is interrupted what there is by then."""
+    from hil.judge.replayed import replayed
+
+    with interrupt, progress("replaying", 100.0, "%") as tell:
+
+        def go_on(share: float) -> bool:
+            tell(100.0 * share)
+            return interrupt.go_on()
+
+        return replayed(log, replace(choice, go_on=go_on))
+
+
+def _refuse_interrupted(interrupt: Interrupt) -> None:
+    """End as interrupted, now that what there is has been told."""
+    if interrupt.number:
+        raise InterruptedRunError("interrupted; this is what was replayed by then", interrupt.number)
 
 
 def _refuse_damage(log: Log, done: Replayed) -> None:

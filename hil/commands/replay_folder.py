@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import os
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from hil.commands.outputs import refuse_no_folder
+from hil.commands.progress import progress
 from hil.errors import AbreastError, CheckFailedError, UsageError
-from hil.log.report_json import print_json, print_text
+from hil.log.report_json import print_json, print_text, say
 from hil.log.written_aside import write_text_aside
-from hil.reports.judged_log import leave, made_folder
+from hil.reports.judged_log import leave, made_folder, results_in
 
 if TYPE_CHECKING:
     from hil.judge.replayed import ReplayChoice
@@ -40,7 +36,7 @@ def replay_folder(
 
     place = out or folder.absolute().with_name(f"{folder.absolute().name}-out")
     refuse_no_folder(place, "--out")
-    with _shown_progress() as show:
+    with progress("replaying", 1.0, "logs") as tell:
         result = judge_logs(
             folder,
             choice,
@@ -48,14 +44,14 @@ def replay_folder(
             workers=workers or len(os.sched_getaffinity(0)),
             scheduler=scheduler,
             leave_out=place,
-            progress=show,
+            progress=tell,
         )
     made_folder(place)
     if not result.get("interrupted"):
         _report_worst(result, choice, place)
     write_judged(result, place)
     write_text_aside(place / "report.html", logs_report(result, place))
-    click.echo(f"results in {place}, look at {place / 'report.html'}", err=True)
+    say(results_in(place))
     if as_json:
         print_json(result)
     else:
@@ -104,15 +100,3 @@ def _told(result: dict[str, Any], verdict: str) -> str:
     if result["worst"]:
         lines += ["worst:", *(f"  {each['log']}: {each['why']}" for each in result["worst"])]
     return "\n".join([*lines, ""])
-
-
-@contextmanager
-def _shown_progress() -> Iterator[Callable[[int, int], None]]:
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.completed:.0f} of {task.total:.0f} logs"), BarColumn(), TimeElapsedColumn())
-    left = (TextColumn("to go"), TimeRemainingColumn())
-    with Progress(*columns, *left, console=Console(file=sys.stderr)) as bar:
-        task = bar.add_task("logs", total=1)
-        yield lambda done, total: bar.update(task, completed=done, total=total)

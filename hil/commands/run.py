@@ -16,6 +16,7 @@ from hil.commands.guard_option import NO_GUARD
 from hil.commands.outputs import OutputFolder, new_folder
 from hil.commands.own_parts import load_own_parts
 from hil.commands.page_options import PagePlace, page_options, page_place, shown_page
+from hil.commands.progress import READY, doing, progress
 from hil.commands.seconds import DURATION, Seconds
 from hil.commands.whole_numbers import Whole
 from hil.errors import AbreastError, CheckFailedError, InterruptedRunError, UsageError
@@ -205,12 +206,14 @@ def _run(chosen: Scenario, folder: Path, live: _Live | None, figures: Kind | Non
     log_path = named if live is None else log_place(named, chosen.recorder)
     if log_path.exists():
         raise UsageError(f"{log_path} exists already; give another --out, or move it away")
-    failure, left, interrupted, timing = "", "", "", {}
+    failure, left, interrupted, signal_number = "", "", "", 0
+    timing: dict[str, dict[str, float]] = {}
     if live is None:
-        timing = {"lockstep": _lockstep(chosen, named)}
+        timing["lockstep"], interrupted, signal_number = _lockstep(chosen, named)
     else:
         outcome = _live(chosen, named, live)
         failure, left, interrupted = outcome.failure, f"{outcome.robots}, ", _interrupted(outcome)
+        signal_number = outcome.signal
         if outcome.recorded and not log_path.exists():
             gone = f"log {log_path} is not there any more: somebody moved or deleted it during the run"
             raise CheckFailedError(f"{failure}; {gone}" if failure else gone)
@@ -231,7 +234,7 @@ def _run(chosen: Scenario, folder: Path, live: _Live | None, figures: Kind | Non
         if failure:
             raise CheckFailedError(f"the run broke down: {failure}; {left}the log is {log_path}")
     if interrupted:
-        raise InterruptedRunError(interrupted, outcome.signal)
+        raise InterruptedRunError(interrupted, signal_number)
 
 
 def _interrupted(outcome: Outcome) -> str:
@@ -246,13 +249,28 @@ def _folder(scenario: Scenario, out: Path | None) -> Path:
 
 
 @collector_paused()
-def _lockstep(scenario: Scenario, log_path: Path) -> dict[str, float]:
-    from hil.lockstep.run import timed_lockstep
+def _lockstep(scenario: Scenario, log_path: Path) -> tuple[dict[str, float], str, int]:
+    """How long it took, and that it was interrupted, if it was, and by which signal."""
+    from hil.live.interrupts import Interrupt
 
-    timing = timed_lockstep(scenario, log_path)
+    duration_s = scenario.run.duration_s
+    with doing(READY):
+        from hil.lockstep.run import prepared, timed_lockstep
+
+        ready = prepared(scenario)
+    with Interrupt() as interrupt, progress("driving", duration_s) as tell:
+
+        def go_on(driven_s: float) -> bool:
+            tell(driven_s)
+            return interrupt.go_on()
+
+        timing = timed_lockstep(scenario, log_path, ready, go_on)
     took, times = timing["wall_s"], timing["times_real_time"]
-    note(f"{scenario.run.duration_s:g} s in lockstep in {took:.2f} s ({times:.0f} times real time)")
-    return timing
+    driven_s = took * times
+    note(f"{driven_s:g} s in lockstep in {took:.2f} s ({times:.0f} times real time)")
+    if not interrupt.number:
+        return timing, "", 0
+    return timing, f"interrupted after {driven_s:.1f} of {duration_s:g} s, the log is whole", interrupt.number
 
 
 def _live(scenario: Scenario, log_path: Path, live: _Live) -> Outcome:
@@ -341,7 +359,8 @@ def _judge(log_path: Path, folder: Path, figures: Kind | None) -> dict[str, Any]
         from hil.commands.chain_results import judge_run
 
         return judge_run(log, own, folder, figures)
-    summary = judge_log(log, folder, figures)
+    with doing("judging"):
+        summary = judge_log(log, folder, figures)
     print_summary(summary)
     say(results_in(folder))
     return summary

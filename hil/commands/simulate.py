@@ -10,6 +10,7 @@ import click
 from hil.commands.figures_option import figures_option, refuse_nowhere
 from hil.commands.outputs import OutputFolder
 from hil.commands.own_parts import load_own_parts
+from hil.commands.progress import doing
 from hil.commands.seconds import DURATION
 from hil.log.report_json import print_json, results_apart, say
 from hil.scenario.files import load_scenario
@@ -42,8 +43,6 @@ def command(
 
     A pair drives without limits, unless it is told to change sides; a chain or a flock of agents within them.
     """
-    from hil.simulate.experiments import experiment
-
     refuse_nowhere(figures, out)
     chosen = [*overrides]
     if law is not None:
@@ -52,7 +51,10 @@ def command(
         chosen.append(f"run.duration_s={duration}")
     loaded = load_scenario(scenario, chosen)
     load_own_parts(loaded, estimates=False)
-    result = experiment(loaded, out, stability=stability, figures=figures).as_dict()
+    with doing("simulating"):
+        from hil.simulate.experiments import experiment
+
+        result = experiment(loaded, out, stability=stability, figures=figures).as_dict()
     if as_json:
         print_json(result)
         return

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import sys
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,10 @@ import click
 
 from hil.commands.outputs import OutputFolder, new_folder
 from hil.commands.own_parts import load_own_parts
+from hil.commands.progress import READY, doing, progress
 from hil.commands.seconds import Seconds
 from hil.commands.whole_numbers import Whole
-from hil.errors import CheckFailedError, UsageError
+from hil.errors import CheckFailedError, InterruptedRunError, UsageError
 from hil.extras import begin_to_judge
 from hil.log.report_json import print_json, results_apart, say
 from hil.reports.judged_log import results_in
@@ -65,9 +66,10 @@ def command(
     Given the same --out again, a sweep that was interrupted goes on. Cells and runs count from 0.
     """
     begin_to_judge("sweep")
-    from hil.sweep.failed_laws import law_failure
-    from hil.sweep.kept_runs import keep_run, worst_runs
-    from hil.sweep.results import write_results
+    with doing(READY):
+        from hil.sweep.failed_laws import law_failure
+        from hil.sweep.kept_runs import keep_run, worst_runs
+        from hil.sweep.results import write_results
 
     names = None if estimators is None else [name.strip() for name in estimators.split(",")]
     if law is not None:
@@ -80,12 +82,19 @@ def command(
     result = _fly(sweep, folder, workers or len(os.sched_getaffinity(0)), scheduler)
     if "worst" in kept:
         to_keep += worst_runs(result)
-    for cell, run in to_keep:
-        say(f"kept {keep_run(sweep, folder, cell, run)}")
+    if not result.get("interrupted"):
+        for cell, run in to_keep:
+            say(f"kept {keep_run(sweep, folder, cell, run)}")
     write_results(sweep, result, folder)
     say(results_in(folder))
     if as_json:
         print_json(result)
+    if result.get("interrupted"):
+        raise InterruptedRunError(
+            f"interrupted after {result['runs_done']} of {sweep.spec.runs * len(sweep.cells())} runs; "
+            f"the same again with --out {folder} goes on",
+            signal.SIGINT,
+        )
     if reason := law_failure(sweep, result):
         raise CheckFailedError(reason)
 
@@ -101,22 +110,10 @@ def _parsed(sweep: Sweep, text: str) -> tuple[int, int]:
 
 
 def _fly(sweep: Sweep, folder: Path, workers: int, scheduler: str | None) -> dict[str, Any]:
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
     from hil.sweep.results import fly_sweep
 
-    console = Console(file=sys.stderr)
-    columns = (TextColumn("{task.completed:.0f} of {task.total:.0f} runs"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, TextColumn("to go"), TimeRemainingColumn(), console=console) as bar:
-        task = bar.add_task("runs", total=sweep.spec.runs * len(sweep.cells()))
-        result = fly_sweep(
-            sweep,
-            folder,
-            workers=workers,
-            scheduler=scheduler,
-            progress=lambda done: bar.update(task, completed=done),
-        )
+    with progress("flying", sweep.spec.runs * len(sweep.cells()), "runs") as tell:
+        result = fly_sweep(sweep, folder, workers=workers, scheduler=scheduler, progress=tell)
     _say(result)
     return result
 

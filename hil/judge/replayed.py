@@ -24,7 +24,7 @@ from hil.log.own_sources import with_sources
 from hil.log.reader import DamagedLogError, Log
 from hil.log.unpacked import salvaged
 from hil.replay.feeding import guessed_link, why_guessed
-from hil.replay.log_replay import kept_replays
+from hil.replay.log_replay import GoOn, kept_replays
 from hil.replay.rerun import linked, replay_chain, replay_fed, replay_foreign, replay_link
 from hil.replay.topic_map import load_topic_map
 from hil.scenario.brought import settled_references
@@ -44,7 +44,8 @@ class ReplayChoice:
     of bodies; in a chain ``follower`` is the one to look at, and without it all are. ``chart``: topic map of
     a log that is not ours. ``from_s``, ``to_s`` [s] limit what is judged. ``verify``: whether outputs are
     compared with the recorded ones. ``certify``: whether certified estimates are made. ``in_messages``: not
-    to be done in one pass, which leaves rows, but message by message.
+    to be done in one pass, which leaves rows, but message by message. ``go_on``: called now and then with the
+    share that is done, where that is known; a replay ends where it says no.
     """
 
     estimator: str | None = None
@@ -58,6 +59,7 @@ class ReplayChoice:
     verify: bool = False
     certify: bool = False
     in_messages: bool = False
+    go_on: GoOn | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -143,7 +145,7 @@ def _replayed_chain(log: Log, own: Scenario, choice: ReplayChoice, changes: Sequ
     chosen = with_overrides(own, *changes)
     if choice.verify:
         refuse_other_steps(chosen, own)
-    kept = None if choice.in_messages else kept_replays(log, linked(log, chosen))
+    kept = None if choice.in_messages else kept_replays(log, linked(log, chosen), choice.go_on)
     played: tuple[Played, ...] = replay_chain(log, chosen) if kept is None else kept
     runs = tuple(
         _with_damage(log, run_data_of_replay(log, each, choice.from_s, choice.to_s)) for each in played
@@ -190,7 +192,7 @@ def _played(log: Log, choice: ReplayChoice, changes: Sequence[Overrides]) -> Pla
 
 def _in_one_pass(log: Log, link: Link, was: Link, choice: ReplayChoice) -> Played:
     """Replay of one follower, message by message where it cannot be done in one pass."""
-    kept = None if choice.in_messages else kept_replays(log, [(link, was)])
+    kept = None if choice.in_messages else kept_replays(log, [(link, was)], choice.go_on)
     return replay_link(log, link, was) if kept is None else kept[0]
 
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import signal
-from types import FrameType
+import time
+from types import FrameType, TracebackType
+from typing import Any
 
+_LOOKS_S = 1.0
 _ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -25,3 +28,39 @@ def interrupt_on_signals(*, once: bool = False) -> None:
         # Who was started with nohup is to outlive its terminal.
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, leave)
+
+
+class Interrupt:
+    """Signals that ask for the end, noted while somebody looks for one and leaves a verdict then.
+
+    ``number``: of the signal, 0 for none. Where nobody has looked for a second, and on a second one, they
+    raise :class:`KeyboardInterrupt`.
+    """
+
+    def __init__(self) -> None:
+        self.number = 0
+        self._looked_s = -_LOOKS_S
+        self._before: dict[signal.Signals, Any] = {}
+
+    def go_on(self) -> bool:
+        """Whether to go on: nobody has asked for the end."""
+        self._looked_s = time.monotonic()
+        return not self.number
+
+    def __enter__(self) -> Interrupt:
+        for number in _ENDS:
+            if signal.getsignal(number) != signal.SIG_IGN:
+                self._before[number] = signal.signal(number, self._heard)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        self._before.clear()
+
+    def _heard(self, number: int, _frame: FrameType | None) -> None:
+        second, self.number = bool(self.number), number
+        if second or time.monotonic() - self._looked_s > _LOOKS_S:
+            raise KeyboardInterrupt

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,6 +25,14 @@ from hil.wire.messages import prepare
 START_TIMEOUT_NS = 10_000_000_000
 STOPPING_NS = 600_000_000
 """Time given to the robots to come to rest after the stop, so that the log shows that they did."""
+
+_LOOK_NS = 200_000_000
+
+GoOn = Callable[[float], bool]
+
+
+def _to_the_end(_driven_s: float) -> bool:
+    return True
 
 
 def make_nodes(scenario: Scenario) -> list[Node[Any]]:
@@ -48,10 +57,14 @@ def prepared(scenario: Scenario) -> Prepared:
     return Prepared(make_nodes(scenario), log_metadata(scenario, "lockstep") | certificate)
 
 
-def run_lockstep(scenario: Scenario, log_path: Path, ready: Prepared | None = None) -> None:
-    """Run a scenario from the start barrier to standstill and write everything to ``log_path``.
+def run_lockstep(
+    scenario: Scenario, log_path: Path, ready: Prepared | None = None, go_on: GoOn = _to_the_end
+) -> float:
+    """Run a scenario from the start barrier to standstill, write everything to ``log_path``; seconds driven.
 
-    ``ready``: if it has been prepared before. Raises :class:`CheckFailedError` if the leader never sets off.
+    ``ready``: if it has been prepared before. ``go_on``: called now and then with the seconds that were
+    driven; the robots are stopped where it says no. Raises :class:`CheckFailedError` if the leader never
+    sets off.
     """
     nodes, metadata = ready or prepared(scenario)
     with DescribedLog(log_path, metadata) as log:
@@ -61,19 +74,26 @@ def run_lockstep(scenario: Scenario, log_path: Path, ready: Prepared | None = No
 
         lockstep = Lockstep(nodes, record)
         since_ns = _wait_for_motion(lockstep)
-        lockstep.run_until(since_ns + round(scenario.run.duration_s * 1e9))
-        lockstep.publish(outgoing(topics.STOP, String(data="end of run"), lockstep.now_ns))
+        end_ns = since_ns + round(scenario.run.duration_s * 1e9)
+        while lockstep.now_ns < end_ns and go_on((lockstep.now_ns - since_ns) * 1e-9):
+            lockstep.run_until(min(end_ns, lockstep.now_ns + _LOOK_NS))
+        driven_ns = lockstep.now_ns - since_ns
+        reason = "end of run" if lockstep.now_ns == end_ns else "interrupted"
+        lockstep.publish(outgoing(topics.STOP, String(data=reason), lockstep.now_ns))
         lockstep.run_until(lockstep.now_ns + STOPPING_NS)
         lockstep.farewell()
+    return driven_ns * 1e-9
 
 
-def timed_lockstep(scenario: Scenario, log_path: Path) -> dict[str, float]:
+def timed_lockstep(
+    scenario: Scenario, log_path: Path, ready: Prepared | None = None, go_on: GoOn = _to_the_end
+) -> dict[str, float]:
     """The same, and how long it took without what there is to load: the part ``lockstep`` of the JSON."""
-    ready = prepared(scenario)
+    ready = ready or prepared(scenario)
     begun = time.perf_counter()
-    run_lockstep(scenario, log_path, ready)
+    driven_s = run_lockstep(scenario, log_path, ready, go_on)
     took = time.perf_counter() - begun
-    return {"wall_s": took, "times_real_time": scenario.run.duration_s / took}
+    return {"wall_s": took, "times_real_time": driven_s / took}
 
 
 def _wait_for_motion(lockstep: Lockstep) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -34,19 +34,25 @@ _MOST_BYTES = 1 << 27
 """Of messages that are kept for outputs to come; what is older then leaves."""
 
 
-def kept_replays(log: Log, links: Sequence[tuple[Link, Link]]) -> tuple[KeptReplay, ...] | None:
+GoOn = Callable[[float], bool]
+
+
+def kept_replays(
+    log: Log, links: Sequence[tuple[Link, Link]], go_on: GoOn | None = None
+) -> tuple[KeptReplay, ...] | None:
     """Replay each follower by its link as it is asked for, beside the log's own, in one pass over the log.
 
     None for what this way cannot do: logs without estimates, estimators that are not compiled or look at
     more than one message at a time, and logs in which something is not as live nodes leave it, an order that
-    is off by seconds, say. Raises :class:`UsageError` for a damaged log.
+    is off by seconds, say. ``go_on``: called now and then with the share of the log that is done; where it
+    says no, the replay ends there. Raises :class:`UsageError` for a damaged log.
     """
     if not compiles() or not all(_may_be_kept(log, chosen) for chosen, _ in links):
         return None
     try:
         replay = LogReplay(log, links)
-        replay.run()
-        return None if replay.looks_back() else replay.results()
+        whole = replay.run(go_on)
+        return None if whole and replay.looks_back() else replay.results()
     except OddLogError:
         return None
 
@@ -94,15 +100,26 @@ class LogReplay:
         for number in range(len(self.followers)):
             self._lend(number)
 
-    def run(self) -> None:
-        """Go through the log."""
+    def run(self, go_on: GoOn | None = None) -> bool:
+        """Go through the log as long as is wished; whether to its end."""
+        whole = True
         for batch in self._bulk.batches:
             self._take(Stage(0, batch.until_ns, NOTHING, False, DONE, 0, 0), batch.records)
             self._look()
+            whole = go_on is None or batch.until_ns == _END_OF_TIME or go_on(self._share(batch.until_ns))
+            if not whole:
+                break
         self._take(Stage(0, _END_OF_TIME, NOTHING, True, DONE, 0, 0), b"")
         messages = load(Extent, self.window.extent, 0).messages
         self._take(Stage(0, _END_OF_TIME, messages, True, DONE, 0, 0), b"")
         self._look()
+        return whole
+
+    def _share(self, until_ns: int) -> float:
+        """Share of the log that was logged before a time, as far as its index tells."""
+        chunks = self.log.chunks
+        span_ns = chunks[-1].last_ns - chunks[0].first_ns if chunks else 0
+        return (until_ns - chunks[0].first_ns) / span_ns if span_ns > 0 else 0.0
 
     def _look(self) -> None:
         for follower in self.followers:

@@ -28,7 +28,8 @@ def fly_sweep(
 ) -> dict[str, Any]:
     """JSON of a sweep, after doing what of it is not in the folder yet.
 
-    ``run_seconds`` and ``wall_s`` are of this call.
+    ``run_seconds`` and ``wall_s`` are of this call. After Ctrl-C it is of what there is: ``interrupted``,
+    with ``runs_done``, and without the cells of which there is nothing.
     """
     begun = time.perf_counter()
     store = Store(folder, sweep)
@@ -40,19 +41,27 @@ def fly_sweep(
     before = done
     progress(done)
     fly = fly_on_cluster(sweep, missing, scheduler) if scheduler else fly_here(sweep, missing, workers)
-    for piece, tallies in fly if missing else ():
-        store.save(piece, tallies)
-        found[piece] = tallies
-        done += len(tallies)
-        progress(done)
+    interrupted = False
+    try:
+        for piece, tallies in fly if missing else ():
+            store.save(piece, tallies)
+            found[piece] = tallies
+            done += len(tallies)
+            progress(done)
+    except KeyboardInterrupt:
+        if not done:
+            raise
+        interrupted = True
     cells, allowed = [], allowed_distances(sweep.scenario)
     for cell in sweep.cells():
-        tallies = np.concatenate([found[piece] for piece in pieces if piece.cell == cell])
-        cells.append(report_cell(cell, tallies, allowed))
+        tallied = [found[piece] for piece in pieces if piece.cell == cell]
+        if flown := [tallies for tallies in tallied if tallies is not None]:
+            cells.append(report_cell(cell, np.concatenate(flown), allowed))
     return {
         "cells": cells,
         "run_seconds": (done - before) * sweep.spec.duration_s,
         "wall_s": time.perf_counter() - begun,
+        **({"interrupted": True, "runs_done": done} if interrupted else {}),
     }
 
 
@@ -63,9 +72,11 @@ def write_results(sweep: Sweep, result: dict[str, Any], folder: Path) -> None:
     """
     with left_out_if_missing("results.parquet"):
         write_table(result["cells"], folder / "results.parquet")
-    for cell, kept in zip(result["cells"], kept_runs(sweep, folder), strict=True):
-        if kept:
-            cell["kept"] = kept
+    # Numbers of cells are those of the whole sweep.
+    if not result.get("interrupted"):
+        for cell, kept in zip(result["cells"], kept_runs(sweep, folder), strict=True):
+            if kept:
+                cell["kept"] = kept
     told = {"version": __version__, "spec": spec_json(sweep.spec), **result}
     write_json(told, folder / "results.json")
     with left_out_if_missing("report.html"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import multiprocessing
 import os
+import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -82,6 +83,8 @@ def _begin_work() -> None:
     What laws and estimators of others print in a worker goes to stderr.
     """
     sys.stdout = sys.stderr
+    # Ctrl-C reaches all of a terminal: who shares the work ends its workers, which finish what they are at.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()

@@ -215,7 +215,7 @@ def test_a_map_makes_a_log_of_another_make_replay(abreast: Any, run_log: Path, t
         (("--verify", "--estimator", "ukf"), "--verify compares with what was recorded: by ekf"),
         (("--map", "nowhere.toml"), "map 'nowhere.toml': no such name and no such file"),
         (("--csv", "/proc/none/e.csv"), "/proc/none/e.csv: cannot be written"),
-        (("--frm", "1"), "No such option"),
+        (("--frm", "1"), "is no option"),
     ],
 )
 def test_a_users_mistake_is_one_line_and_exit_code_2(
