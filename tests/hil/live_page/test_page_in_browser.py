@@ -79,7 +79,8 @@ def test_a_lab_is_seen_on_a_phone_and_at_a_desk_and_fits(
             assert words in page.text(name), name
         assert page.script("return document.documentElement.scrollWidth") <= width
         height, below = page.script(
-            "const box = stop.getBoundingClientRect(); return [box.height, box.bottom - innerHeight]"
+            "const box = document.getElementById('stop').getBoundingClientRect();"
+            "return [box.height, box.bottom - innerHeight]"
         )
         assert height >= 70
         assert below <= 0

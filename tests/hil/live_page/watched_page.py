@@ -77,7 +77,10 @@ class WatchedPage:
 
     def button(self, text: str) -> Any:
         """A button by what stands on it."""
-        return self.chrome.find_element(By.XPATH, f"//button[normalize-space()='{text}']")
+        found = self.chrome.find_element(By.XPATH, f"//button[normalize-space()='{text}']")
+        # Else it may lie behind the bar with the stop button.
+        self.chrome.execute_script("arguments[0].scrollIntoView({block: 'center'})", found)
+        return found
 
     def errors(self) -> list[str]:
         """What the browser complained of since the page was opened."""
