@@ -27,6 +27,7 @@ FRAME_S = 0.05
 """From one frame for browsers to the next [s]."""
 
 MOST_BROWSERS = 16
+_MOST_FAILURES = 20
 _REPORT_S = 0.5
 _LINGER_S = 5.0
 """For so long [s] the lab is listened to after the last browser left: a page may be loaded anew."""
@@ -63,6 +64,7 @@ class LivePage:
         self._viewers: list[Viewer] = []
         self._number = secrets.token_hex(4)
         self._clock = time.monotonic
+        self._failures: set[str] = set()
         self._empty_since, self._said = self._clock(), 0
         self._orbit: asyncio.Future[None] | None = None
 
@@ -150,6 +152,13 @@ class LivePage:
             self._newest.close()
             self._newest = None
         self._orders.close()
+
+    def say_failed(self, error: Exception) -> None:
+        """Tell the terminal of what kept a frame from being made, each thing once."""
+        line = f"what the lab said cannot be shown: {error!r}; please report this"
+        if line not in self._failures and len(self._failures) < _MOST_FAILURES:
+            self._failures.add(line)
+            self._say(line)
 
     def say_refused(self) -> None:
         """Tell the terminal of requests that were refused since it was told last."""

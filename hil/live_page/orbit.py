@@ -8,13 +8,18 @@ import numpy as np
 
 from formation.angles import FloatArray
 from formation.closed_loop import IntegrationError, Trajectory
+from formation.station import Side
 from hil.errors import AbreastError
 from hil.scenario.links import chain_of
+from hil.scenario.ordered_sides import ordered_sides
 from hil.scenario.schema import Scenario
 
 _STEP_S = 1.0 / 30.0
 _LONGEST_S = 600.0
 """What comes later is not drawn."""
+
+_REPORTED_S = 1.5
+"""Within this time [s] an order shows in its follower's reports."""
 
 
 class Orbit:
@@ -44,3 +49,14 @@ def orbit_of(scenario: Scenario) -> Orbit | None:
         return Orbit(noise_free_run(scenario, times))
     except (IntegrationError, AbreastError):
         return None
+
+
+def is_due(scenario: Scenario, side: str, since_s: float) -> bool:
+    """Whether a follower is on a side by its scenario, at a time [s] since the leader set off.
+
+    If not, somebody else has sent it there, and it does not go on as the orbit does.
+    """
+    orders = [(-math.inf, Side(scenario.formation.side)), *ordered_sides(scenario)]
+    # An order and its report take their time.
+    known = [place for place, (at_s, _) in enumerate(orders) if at_s <= since_s - _REPORTED_S]
+    return side in {each.value for at_s, each in orders[known[-1] :] if at_s <= since_s + _REPORTED_S}

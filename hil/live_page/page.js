@@ -17,7 +17,7 @@ const since = moment => (performance.now() - moment) / 1000;
 const aged = age => age == null ? null : age + (frame?.link ?? 0) + since(came);
 const old = (age, most = FRESH_S) => age === null || age > most;
 const seconds = age => age === null ? "never" : age < 9.95 ? `${age.toFixed(1)} s` : age < 600 ? `${age.toFixed(0)} s` : `${(age / 60).toFixed(0)} min`;
-const signed = (value, digits, unit) => value == null ? "–" : `${value < 0 ? "−" : "+"}${Math.abs(value).toFixed(digits)} ${unit}`;
+const signed = (value, digits, unit = "") => value == null ? "–" : `${value < 0 ? "−" : "+"}${Math.abs(value).toFixed(digits)} ${unit}`.trim();
 
 const number = (value, { digits, unit, plain }) => plain ? `${value.toFixed(digits)} ${unit}` : signed(value, digits, unit);
 
@@ -198,7 +198,7 @@ function robots() {
 
 // A cell with speed and turn rate, how old they are, and whether that is a robot that stands.
 function motion(values, age, stands, otherwise) {
-  const cell = make("td", values ? stands ? "stands" : `${signed(values[0], 3, "m/s")}, ${signed(values[1], 2, "rad/s")}` : otherwise);
+  const cell = make("td", values ? stands ? "stands" : `${signed(values[0], 3)}, ${signed(values[1], 2)}` : otherwise);
   if (values) cell.append(make("small", `${seconds(age)} ago`, old(age) ? "bad" : ""));
   return cell;
 }

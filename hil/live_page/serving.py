@@ -114,7 +114,11 @@ async def serve(page: LivePage, listening: socket.socket, ending: Ending) -> Non
     try:
         while not ending.asked:
             page.woken.clear()
-            page.go_round()
+            try:
+                page.go_round()
+            except Exception as error:
+                # A stop has to work whatever cannot be drawn; the page itself says that nothing comes.
+                page.say_failed(error)
             if loop.time() - told_at > _TELL_S:
                 told_at = loop.time()
                 page.say_refused()

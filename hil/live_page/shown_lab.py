@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from estimation.tracking.tracker import Status
 from formation.mount import robot_pose
 from formation.pose import Motion, Pose
 from formation.station import Side, Station
@@ -13,9 +12,9 @@ from hil.live.guards_heard import GuardsHeard
 from hil.live.lab_state import LabState
 from hil.live.reported_number import reported_number
 from hil.live_page.arrivals import Arrivals
-from hil.live_page.believed_leader import believed_pose, motion_ellipse
-from hil.live_page.orbit import Orbit
-from hil.live_page.shown_numbers import clipped, deviation, shown
+from hil.live_page.orbit import Orbit, is_due
+from hil.live_page.shown_estimate import shown_estimate
+from hil.live_page.shown_numbers import clipped, shown
 from hil.scenario.links import STARTERS, links_of
 from hil.scenario.parts import may_change_sides
 from hil.scenario.schema import Scenario
@@ -37,9 +36,6 @@ _MOST_NODES, _MOST_FINDINGS, _MOST_CAUSES, _LONGEST_CAUSE = 60, 5, 10, 60
 
 _STILL_V, _STILL_U = 0.01, 0.05
 """What wheels say of a robot that stands [m/s, rad/s]."""
-
-_V1, _ALPHA1, _U1 = 2, 3, 4
-"""Places in the covariance of an estimate, of five rows."""
 
 
 class ShownLab:
@@ -71,6 +67,7 @@ class ShownLab:
         self._stopped_by = ""
         self._motion_since_ns: int | None = None
         self._sides: dict[str, tuple[str, str]] = {}
+        self._sent_elsewhere = False
 
     def hear(self, event: Event, now: float) -> None:
         """Take in a message; what cannot be read is counted."""
@@ -182,38 +179,26 @@ class ShownLab:
         arrival = self._arrivals.of(pair.estimate)
         if arrival is None or (seen := arrival.read_as(msg.LeaderEstimate)) is None:
             return None
-        known = [status.value for status in Status]
-        variance = [float(seen.covariance[6 * row]) for row in (_V1, _ALPHA1, _U1)]
+        own = self._poses.get(self._robots[place + 1].name)
         return {
             "age": round(now - arrival.at, 3),
-            "status": Status(seen.status).name.lower() if seen.status in known else "unknown",
-            "reason": clipped(seen.reason),
-            "shape": [shown(seen.rho), shown(seen.alpha1), shown(seen.alpha2)],
-            "v1": [shown(seen.v1), deviation(variance[0]), shown(seen.bound_v1)],
-            "alpha1": [shown(seen.alpha1), deviation(variance[1]), shown(seen.bound_alpha1)],
-            "u1": [shown(seen.u1), deviation(variance[2]), None],
-            "leader": self._believed(place, seen, variance),
+            **shown_estimate(seen, own[0] if own is not None and own[1] else None),
             "orbit": self._orbit_then(seen),
         }
-
-    def _believed(self, place: int, seen: msg.LeaderEstimate, variance: list[float]) -> dict[str, Any] | None:
-        """The leader as the follower of a place believes it to be, drawn from where that is."""
-        own = self._poses.get(self._robots[place + 1].name)
-        if own is None or not own[1]:
-            return None
-        pose = believed_pose(own[0], seen.rho, seen.alpha1, seen.alpha2)
-        both = float(seen.covariance[5 * _V1 + _ALPHA1])
-        ellipse = motion_ellipse(pose.theta, seen.v1, variance[0], both, variance[1])
-        return {"pose": [*map(shown, pose)], "ellipse": [*map(shown, ellipse)] if ellipse else None}
 
     def _orbit_then(self, seen: msg.LeaderEstimate) -> list[float | None] | None:
         since_ns = self._motion_since_ns
         if self.orbit is None or since_ns is None:
             return None
         try:
-            shape = self.orbit.at((to_ns(seen.header.stamp) - since_ns) * 1e-9)
+            since_s = (to_ns(seen.header.stamp) - since_ns) * 1e-9
         except MalformedPayloadError:
             return None
+        side, _ = self._sides.get(self.followers[0], (self._scenario.formation.side, ""))
+        self._sent_elsewhere = self._sent_elsewhere or not is_due(self._scenario, side, since_s)
+        if self._sent_elsewhere:
+            return None
+        shape = self.orbit.at(since_s)
         return [*map(shown, shape)] if shape else None
 
     def _station(self, place: int) -> list[float | None]:

@@ -73,13 +73,14 @@ def test_a_lab_is_seen_on_a_phone_and_at_a_desk_and_fits(
             "verdict": "tracking",
             "against": 'axes: <img src="x" onerror="alert(1)">',
             "nodes": "7 tilted",
-            "robots": "+0.200 m/s",
+            "robots": "+0.200, ",
             "side": "the follower on the left, side change under way",
         }.items():
             assert words in page.text(name), name
         assert page.script("return document.documentElement.scrollWidth") <= width
         height, below = page.script(
-            "const box = stop.getBoundingClientRect(); return [box.height, box.bottom - innerHeight]"
+            "const box = document.getElementById('stop').getBoundingClientRect();"
+            "return [box.height, box.bottom - innerHeight]"
         )
         assert height >= 70
         assert below <= 0

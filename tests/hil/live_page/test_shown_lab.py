@@ -71,24 +71,23 @@ def test_what_was_heard_is_shown_with_its_age() -> None:
     assert reports["side"] == {"side": "left", "change": "under way"}
 
 
+POSE = st.builds(Pose, ANY, ANY, st.floats(allow_infinity=False))
+
+
 @given(
-    st.lists(ANY, min_size=7, max_size=7),
-    ANY,
-    ANY,
+    st.tuples(POSE, POSE) | st.just((LEADER, FOLLOWER)),
+    st.builds(Motion, ANY, ANY),
     st.lists(ANY, min_size=8, max_size=32),
     st.text(max_size=400),
 )
 def test_whatever_is_said_what_is_shown_is_json(
-    pose: list[float], v: float, u: float, numbers: list[float], text: str
+    poses: tuple[Pose, Pose], moves: Motion, numbers: list[float], text: str
 ) -> None:
     lab = ShownLab(SCENARIO)
-    lab.orbit = None
-    text = text.replace("\0", "")
-    leader, follower = Pose(*pose[:3]), Pose(*pose[3:6])
-    for topic, payload in lab_words(leader, follower, Motion(v, u), numbers, text):
+    for topic, payload in lab_words(*poses, moves, numbers, text.replace("\0", "")):
         lab.hear(Event(topic, payload), 1.0)
     motion, reports = shown(lab)
-    assert motion["estimate"]["v1"][0] is None or math.isfinite(motion["estimate"]["v1"][0])
+    assert (motion["estimate"]["v1"][0] is not None) == math.isfinite(numbers[3])
     assert len(json.dumps(reports)) < 50_000
 
 
@@ -123,6 +122,25 @@ def test_the_orbit_is_shown_from_when_the_leader_set_off() -> None:
     report = diagnostics("emulator", 10 * NS, "", {"motion_since_ns": 7 * NS})
     lab.hear(Event("diagnostics", encode(report)), 1.0)
     assert shown(lab)[0]["estimate"]["orbit"] == pytest.approx(orbit.at(2.0), rel=1e-5)
+
+
+def test_the_orbit_is_not_shown_any_more_once_somebody_else_sent_the_follower_to_a_side() -> None:
+    lab = ShownLab(SCENARIO)
+    lab.orbit = orbit_of(SCENARIO)
+
+    def orbit_at(since_s: float, side: str) -> object:
+        started = diagnostics("emulator", 10 * NS, "", {"motion_since_ns": 7 * NS})
+        lab.hear(Event("diagnostics", encode(started)), 1.0)
+        lab.hear(Event("diagnostics", encode(diagnostics("controller", 5, "", {"side": side}))), 1.0)
+        seen = estimate(NUMBERS, stamp_ns=7 * NS + round(since_s * NS))
+        lab.hear(Event("follower/leader_estimate", encode(seen)), 1.0)
+        return shown(lab)[0]["estimate"]["orbit"]
+
+    for since_s, side in ((7.0, "right"), (8.5, "right"), (8.5, "left"), (29.0, "left"), (31.0, "right")):
+        assert orbit_at(since_s, side), (since_s, side)
+    assert orbit_at(33.0, "left") or orbit_at(33.0, "right"), "one of both is on its way"
+    assert orbit_at(36.0, "right") is None
+    assert orbit_at(36.5, "left") is None
 
 
 def test_a_thousand_nodes_of_long_words_make_no_long_frame() -> None:

@@ -77,9 +77,14 @@ class WatchedPage:
 
     def button(self, text: str) -> Any:
         """A button by what stands on it."""
-        return self.chrome.find_element(By.XPATH, f"//button[normalize-space()='{text}']")
+        found = self.chrome.find_element(By.XPATH, f"//button[normalize-space()='{text}']")
+        # Else it may lie behind the bar with the stop button.
+        self.chrome.execute_script("arguments[0].scrollIntoView({block: 'center'})", found)
+        return found
 
     def errors(self) -> list[str]:
         """What the browser complained of since the page was opened."""
         log = self.chrome.execute("getLog", {"type": "browser"})["value"]
-        return [str(entry["message"]) for entry in log if entry["level"] != "INFO"]
+        said = [str(entry["message"]) for entry in log if entry["level"] != "INFO"]
+        # It is our own look at the pictures that is not as fast as could be.
+        return [each for each in said if "getImageData" not in each]
