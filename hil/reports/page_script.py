@@ -7,9 +7,10 @@ import json
 from hil.reports.colours import DARKENED
 
 NOW, ROBOT, JOINED, TRACK = "now", "robot ", "joined", "track "
-"""Names of models that the time slider moves: the cursor, a robot, the line between all, and a robot's track.
+"""Names of what the time slider moves or reads: the cursor, robots, the line through them, their tracks.
 
-The data of a robot carry its outline, ahead to the right, in their tags.
+Those of robots and tracks end in the robot's number. The data of a robot carry its outline, ahead to the
+right, in their tags.
 """
 
 _HIGHEST_ON_A_PHONE = 350
@@ -81,6 +82,7 @@ drawn.then(() => {
     .map(each => [each.name, each]));
   const now = named.get("now"), joined = named.get("joined");
   const robots = [...named.keys()].filter(name => name.startsWith("track "))
+    .sort((one, other) => one.slice(6) - other.slice(6))
     .map(name => [named.get(name).data, named.get(name.replace("track", "robot"))]);
   const after = (t, at) => { // the first place that is not before a time; holes have none
     let low = 0, high = t.length;
