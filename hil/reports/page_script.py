@@ -69,7 +69,11 @@ const inked = () => {
     if (Object.keys(changes).length) model.setv(changes);
   }
 };
-const drawn = Bokeh.embed.embed_items(plots, %(items)s).then(() => { swapped.push(inked); inked(); });
+const drawn = Bokeh.embed.embed_items(plots, %(items)s).then(() => {
+  swapped.push(inked); inked();
+  // Who goes through the page by keyboard is not held up by every plot.
+  for (const view of Bokeh.index.roots) if (view.canvas_view) view.canvas_view.events_el.tabIndex = -1;
+});
 const toolsOf = kind => Bokeh.documents[0].roots().flatMap(plot => plot.toolbar.tools)
   .filter(tool => tool.type === kind);
 """
