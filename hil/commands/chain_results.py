@@ -17,6 +17,7 @@ from hil.judge.replayed import Replayed
 from hil.judge.run_data import RunData, run_data_of_link
 from hil.log.reader import Log
 from hil.log.report_json import note, print_json, say, write_json
+from hil.log.written_aside import write_text_aside
 from hil.replay.estimate_csv import write_estimates
 from hil.reports.judged_log import made_folder, results_in
 from hil.scenario.links import links_of
@@ -27,17 +28,13 @@ if TYPE_CHECKING:
 
 
 def judge_run(log: Log, scenario: Scenario, folder: Path, figures: Kind | None = None) -> dict[str, Any]:
-    """Judge the log of a run, and leave summary and picture beside it."""
+    """Judge the log of a run, and leave summary, picture and page beside it."""
     with doing("judging"):
         runs = [run_data_of_link(log, link) for link in links_of(scenario)]
         summary = summarise_chain(scenario, runs)
         _write(scenario, runs, summary, folder, "run.png", figures)
     print_chain(summary)
     say(results_in(folder))
-    say(
-        f"a page is made of one follower at a time: abreast replay {log.path} "
-        f"--follower {runs[-1].scenario.follower.name} --out DIR"
-    )
     return summary
 
 
@@ -79,6 +76,11 @@ def _write(
 ) -> None:
     write_json(summary, folder / "summary.json")
     trajectory = driven_trajectory(runs)
+    with left_out_if_missing("report.html"):
+        from hil.reports.chain_report import chain_report
+
+        page = chain_report(scenario, runs, trajectory, summary)
+        write_text_aside(folder / "report.html", page)
     if trajectory is None:
         note("no picture: the log does not tell where the robots really were")
         return

@@ -21,6 +21,7 @@ from hil.figures.panel_strokes import (
 )
 from hil.figures.plot_data import PlotData, broken_at_jumps, with_gaps
 from hil.figures.robot_drawing import FOLLOWER
+from hil.judge.columns import inside
 from hil.judge.summary import percentile
 
 _DEGREES = math.degrees(1.0)
@@ -130,7 +131,7 @@ def draw_latency(axes: Axes, data: PlotData) -> None:
     The axis is logarithmic where the longest is many times the median.
     """
     commands = data.columns.commands
-    first = commands.fresh
+    first = commands.fresh & inside(commands.issued_ns, data.columns.run)
     waits_ms: FloatArray = (commands.issued_ns - commands.capture_ns)[first] * np.float64(1e-6)
     t, median, largest = data.seconds(commands.issued_ns[first]), percentile(waits_ms, 50.0), np.max(waits_ms)
     axes.plot(t, waits_ms, ls="none", marker=".", ms=2.0, color=FOLLOWER, label="capture to command")
@@ -152,7 +153,7 @@ Panel = Callable[[Axes, PlotData], None]
 def panels_for(data: PlotData) -> tuple[list[Panel], list[Panel], list[Panel]]:
     """Panels that have something to show: of the wire, of the shape, of the leader's motion and commands."""
     columns, estimated = data.columns, len(data.tracked.capture_ns) > 0
-    wire: list[Panel] = [draw_latency] if np.any(columns.commands.fresh) else []
+    wire: list[Panel] = [draw_latency] if _waited(data) else []
     shape: list[Panel] = []
     motion: list[Panel] = []
     if estimated or np.any(np.isfinite(columns.truth.rho)):
@@ -164,6 +165,12 @@ def panels_for(data: PlotData) -> tuple[list[Panel], list[Panel], list[Panel]]:
     if estimated:
         (shape if len(shape) < 4 and len(motion) == 4 else motion).append(draw_u1)
     return wire, shape, motion
+
+
+def _waited(data: PlotData) -> bool:
+    """Whether any command of the run rests on a capture."""
+    commands = data.columns.commands
+    return bool(np.any(commands.fresh & inside(commands.issued_ns, data.columns.run)))
 
 
 def _draw_desired(axes: Axes, data: PlotData, column: int, label: str) -> None:

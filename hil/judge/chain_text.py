@@ -18,7 +18,7 @@ from hil.judge.made_by import made_by
 from hil.judge.summary_text import BAD, GOOD, PLAIN, extended_violations, parity_line, warnings_of
 from hil.log.report_json import result_console
 
-_COLUMNS = ("follower", "rho [m]", "settled", "v1 RMSE", "alpha1", "bounds", "p50, p99")
+_COLUMNS = ("follower", r"rho \[m]", "settled", "v1 RMSE", "alpha1", "bounds", "p50, p99")
 
 
 def print_chain(summary: Mapping[str, Any], console: Console | None = None) -> None:
@@ -30,7 +30,7 @@ def print_chain(summary: Mapping[str, Any], console: Console | None = None) -> N
     console.print(head)
     table = Table(*_COLUMNS, box=None, padding=(0, 2, 0, 0))
     for pair in summary["pairs"]:
-        table.add_row(*(Text(text, style=style) for text, style in _cells(pair)))
+        table.add_row(*(Text(text, style=style) for text, style in chain_cells(pair)))
     console.print(table)
     for pair in summary["pairs"]:
         for warning in warnings_of(pair):
@@ -54,7 +54,8 @@ def _head_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
         yield "log", f"{log['path']} ({log['messages']} messages, {log['bytes'] / 1e6:.1f} MB)", PLAIN
 
 
-def _cells(pair: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def chain_cells(pair: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Text and style of each cell of a follower's row, empty where nothing is known."""
     yield pair["follower"], "bold"
     formation = pair.get("formation", {})
     yield (f"{pair['rho_min']:.3f} to {pair['rho_max']:.3f}" if "rho_min" in pair else ""), PLAIN

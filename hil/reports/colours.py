@@ -9,6 +9,9 @@ from __future__ import annotations
 BLUE, VERMILION, PURPLE, DARK, GREY = "#0072b2", "#d55e00", "#a8478a", "#333333", "#6e6e6e"
 BLACK, PAPER, GRID, AXIS = "#222222", "#ffffff", "#e4e4e4", "#bbbbbb"
 SHADE = "#000000"
+GREEN, OCHRE = "#00795a", "#8a6d00"
+AGENTS = (BLUE, VERMILION, PURPLE, GREEN, OCHRE, DARK)
+"""Colours of the robots of a chain, in turn."""
 LEADER, FOLLOWER, BELIEVED, BOUND, ORBIT, TRUE, LIMIT = BLUE, VERMILION, BLUE, VERMILION, PURPLE, DARK, GREY
 
 DARKENED = {
@@ -22,6 +25,8 @@ DARKENED = {
     GRID: "#30353b",
     AXIS: "#5f666e",
     SHADE: "#fefefe",
+    GREEN: "#48c79a",
+    OCHRE: "#d9b441",
 }
 """Colours of plots and legends, and what they are in the dark. No two become one."""
 

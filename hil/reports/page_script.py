@@ -7,9 +7,10 @@ import json
 from hil.reports.colours import DARKENED
 
 NOW, ROBOT, JOINED, TRACK = "now", "robot ", "joined", "track "
-"""Names of models that the time slider moves: the cursor, a robot, the line between all, and a robot's track.
+"""Names of what the time slider moves or reads: the cursor, robots, the line through them, their tracks.
 
-The data of a robot carry its outline, ahead to the right, in their tags.
+Those of robots and tracks end in the robot's number. The data of a robot carry its outline, ahead to the
+right, in their tags.
 """
 
 _HIGHEST_ON_A_PHONE = 350
@@ -68,7 +69,11 @@ const inked = () => {
     if (Object.keys(changes).length) model.setv(changes);
   }
 };
-const drawn = Bokeh.embed.embed_items(plots, %(items)s).then(() => { swapped.push(inked); inked(); });
+const drawn = Bokeh.embed.embed_items(plots, %(items)s).then(() => {
+  swapped.push(inked); inked();
+  // Who goes through the page by keyboard is not held up by every plot.
+  for (const view of Bokeh.index.roots) if (view.canvas_view) view.canvas_view.events_el.tabIndex = -1;
+});
 const toolsOf = kind => Bokeh.documents[0].roots().flatMap(plot => plot.toolbar.tools)
   .filter(tool => tool.type === kind);
 """
@@ -81,6 +86,7 @@ drawn.then(() => {
     .map(each => [each.name, each]));
   const now = named.get("now"), joined = named.get("joined");
   const robots = [...named.keys()].filter(name => name.startsWith("track "))
+    .sort((one, other) => one.slice(6) - other.slice(6))
     .map(name => [named.get(name).data, named.get(name.replace("track", "robot"))]);
   const after = (t, at) => { // the first place that is not before a time; holes have none
     let low = 0, high = t.length;

@@ -84,6 +84,12 @@ def warnings_html(summary: Mapping[str, Any], part: str) -> str:
     return f'<ul class="warnings">{lines}</ul>' if lines else ""
 
 
+def finding_name(finding: Mapping[str, Any]) -> str:
+    """The name of a finding in words."""
+    name = str(finding["name"])
+    return "NEES" if name == "nees" else name.replace("_", " ")
+
+
 def _verdict(reasons: Sequence[Reason]) -> tuple[str, str]:
     wrong = [reason for reason in reasons if reason.style == BAD]
     if wrong:
@@ -174,7 +180,7 @@ def _latency(summary: Mapping[str, Any]) -> Reason | None:
 def _findings(summary: Mapping[str, Any]) -> Reason | None:
     if "findings" not in summary:
         return None
-    names = [str(finding["name"]).replace("_", " ") for finding in summary["findings"]]
+    names = [finding_name(finding) for finding in summary["findings"]]
     return Reason("findings", WARN if names else GOOD, ", ".join(names) or "none")
 
 

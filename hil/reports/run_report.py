@@ -17,7 +17,7 @@ from hil.reports.notation import written
 from hil.reports.page import Section, Timeline, page
 from hil.reports.plots import Panel, TimeAxis
 from hil.reports.provenance import provenance_html
-from hil.reports.reasons import verdict_html, warnings_html
+from hil.reports.reasons import finding_name, verdict_html, warnings_html
 from hil.reports.run_tables import stops_table, summary_tables
 from hil.reports.shape_plots import COURSE, shape_panels
 from hil.reports.track_plot import track_panel
@@ -102,7 +102,7 @@ def _findings(summary: Mapping[str, Any]) -> str:
     if "findings" not in summary:
         return ""
     listed = "".join(
-        f"<dt>{escape(str(finding['name']).replace('_', ' '))}</dt>"
+        f"<dt>{escape(finding_name(finding))}</dt>"
         f"<dd>{escape(written(str(finding['text'])))}; {escape(str(finding['advice']))}</dd>"
         for finding in summary["findings"]
     )

@@ -26,7 +26,7 @@ _MARK = np.array([(1.0, 0.0), (-0.7, 0.62), (-0.4, 0.0), (-0.7, -0.62)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Robot:
+class Robot:
     """A robot's name, its colour, and its poses, rows x, y, theta."""
 
     name: str
@@ -42,6 +42,11 @@ def track_panel(data: PlotData) -> Panel | None:
     if not np.any(known):
         return None
     t, both = data.seconds(columns.truth.capture_ns[known]), both[known]
+    return tracks(t, (Robot("leader", LEADER, both[:, :3]), Robot("follower", FOLLOWER, both[:, 3:])))
+
+
+def tracks(t: FloatArray, robots: Sequence[Robot]) -> Panel:
+    """Tracks of robots, each joined to the next, whose poses are known at all of the times t [s]."""
     plot = blank(
         height=_HEIGHT,
         x_label="x [m]",
@@ -53,29 +58,31 @@ def track_panel(data: PlotData) -> Panel | None:
     plot.add_tools(Model("PanTool"), Model("WheelZoomTool"), zoom, Model("ResetTool"))
     plot.x_axis.set(ticker=Model("BasicTicker", desired_num_ticks=5))
     plot.set(match_aspect=True)
-    robots = (_Robot("leader", LEADER, both[:, :3]), _Robot("follower", FOLLOWER, both[:, 3:]))
-    lines = [_draw_track(plot, t, robot) for robot in robots]
+    lines = [_draw_track(plot, t, robot, number) for number, robot in enumerate(robots)]
     for axis_range in ("x_range", "y_range"):
         # What moves over the tracks does not move the picture.
         plot.attributes[axis_range].set(renderers=lines)
     rows = spread_rows(len(t), _MOMENTS)
-    pairs = source_of({"xs": both[rows][:, [0, 3]].tolist(), "ys": both[rows][:, [1, 4]].tolist()})
+    places = np.stack([robot.poses[rows, :2] for robot in robots], axis=1)
+    joins = source_of({"xs": places[:, :, 0].tolist(), "ys": places[:, :, 1].tolist()})
     looks = {"line_color": Value(GREY), "line_dash": Value("dotted")}
-    plot.add_glyph(pairs, Model("MultiLine", **_OUTLINE, **looks))
-    extent = float(np.max(np.ptp(np.concatenate([both[:, :2], both[:, 3:5]]), axis=0)))
+    plot.add_glyph(joins, Model("MultiLine", **_OUTLINE, **looks))
+    extent = float(np.max(np.ptp(np.concatenate([robot.poses[:, :2] for robot in robots]), axis=0)))
     size = _MARK_SHARE * max(extent, 1.0)
-    for robot in robots:
-        _draw_marks(plot, t[rows], robot.poses[rows], robot.colour, size)
+    for number, robot in enumerate(robots):
+        _draw_marks(plot, robot.poses[rows], robot.colour, size)
+        if number == 0 or len(robots) == 2:
+            _write_moments(plot, t[rows], robot.poses[rows])
     _draw_robots(plot, robots, 1.7 * size)
     says = (
-        f"True tracks of both robots from {t[0]:.3g} s to {t[-1]:.3g} s. Arrowheads show where each was "
-        f"and headed at {len(rows)} moments, dotted lines join the two; the large ones are at the time of "
-        "the slider."
+        f"True tracks of {'both' if len(robots) == 2 else 'all'} robots from {t[0]:.3g} s to {t[-1]:.3g} s. "
+        f"Arrowheads show where each was and headed at {len(rows)} moments, dotted lines join them; the "
+        "large ones are at the time of the slider."
     )
-    return Panel("From above", says, (Key("leader", LEADER), Key("follower", FOLLOWER)), plot, tall=True)
+    return Panel("From above", says, tuple(Key(each.name, each.colour) for each in robots), plot, tall=True)
 
 
-def _draw_track(plot: Figure, t: FloatArray, robot: _Robot) -> Model:
+def _draw_track(plot: Figure, t: FloatArray, robot: Robot, number: int) -> Model:
     poses, name = robot.poses, robot.name
     rows = spread_rows(len(t), MOST_POINTS)
     moments, x = with_gaps(t[rows], poses[rows, 0])
@@ -83,16 +90,16 @@ def _draw_track(plot: Figure, t: FloatArray, robot: _Robot) -> Model:
     _, heading = with_gaps(t[rows], np.degrees(poses[rows, 2]))
     columns = {"t": moments, "x": x, "y": y, "heading": heading}
     source = source_of({key: values.astype(np.float32) for key, values in columns.items()})
-    source.set(name=TRACK + name)
+    source.set(name=f"{TRACK}{number}")
     glyph = Model("Line", x=Field("x"), y=Field("y"), line_color=robot.colour, line_width=1.8)
     line = plot.add_glyph(source, glyph)
-    tips = {name: "@t{0.00} s", "x": "@x{0.000} m", "y": "@y{0.000} m", "heading": "@heading{0.0}°"}
+    tips = {name: "@t{0.00} s", "x": "@x{0.000} m", "y": "@y{0.000} m", "heading": "@heading{0.0} deg"}
     hover(plot, line, tips, mode="mouse")
     return line
 
 
-def _draw_marks(plot: Figure, t: FloatArray, poses: FloatArray, colour: str, size: float) -> None:
-    """Arrowheads, the later the darker, with the moment behind each."""
+def _draw_marks(plot: Figure, poses: FloatArray, colour: str, size: float) -> None:
+    """Arrowheads, the later the darker."""
     xs, ys = [], []
     for pose in poses:
         outline = _outline(pose, size)
@@ -103,6 +110,10 @@ def _draw_marks(plot: Figure, t: FloatArray, poses: FloatArray, colour: str, siz
     looks = {"fill_color": Value(colour), "fill_alpha": Field("opacity")}
     edge = {"line_color": Value(PAPER), "line_width": Value(0.7)}
     plot.add_glyph(outlines, Model("Patches", **_OUTLINE, **looks, **edge))
+
+
+def _write_moments(plot: Figure, t: FloatArray, poses: FloatArray) -> None:
+    """The moment beside each pose."""
     texts = [f"{moment:.3g} s" for moment in t.tolist()]
     moments = source_of({"x": poses[:, 0], "y": poses[:, 1], "text": texts})
     font = {"text_font_size": Value("11px"), "text_color": Value(GREY)}
@@ -110,17 +121,17 @@ def _draw_marks(plot: Figure, t: FloatArray, poses: FloatArray, colour: str, siz
     plot.add_glyph(moments, Model("Text", x=Field("x"), y=Field("y"), text=Field("text"), **font, **offset))
 
 
-def _draw_robots(plot: Figure, robots: Sequence[_Robot], size: float) -> None:
+def _draw_robots(plot: Figure, robots: Sequence[Robot], size: float) -> None:
     """The robots at the time of the slider, and the line that joins them; at first where they ended."""
     last = [robot.poses[-1].tolist() for robot in robots]
     joined = source_of({"x": [x for x, _, _ in last], "y": [y for _, y, _ in last]})
     joined.set(name=JOINED)
     line = Model("Line", x=Field("x"), y=Field("y"), line_color=DARK, line_width=1.5)
     drawn = [plot.add_glyph(joined, line)]
-    for robot in robots:
+    for number, robot in enumerate(robots):
         outline = _outline(robot.poses[-1], size)
         source = source_of({"xs": [outline[:, 0].tolist()], "ys": [outline[:, 1].tolist()]})
-        source.set(name=ROBOT + robot.name, tags=(size * _MARK).tolist())
+        source.set(name=f"{ROBOT}{number}", tags=(size * _MARK).tolist())
         looks = {"fill_color": Value(robot.colour), "line_color": Value(DARK), "line_width": Value(1.5)}
         drawn.append(plot.add_glyph(source, Model("Patches", **_OUTLINE, **looks)))
     for each in drawn:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import math
 import re
 import subprocess
@@ -12,6 +13,9 @@ from pathlib import Path
 import msgspec
 import pytest
 from selenium.webdriver import Chrome
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import WebDriverWait
 
 from estimation.tracking.tracker import Status
 from hil.figures.plot_data import PlotData
@@ -19,9 +23,13 @@ from hil.judge.run_data import RunData, run_data_of_log
 from hil.judge.summary import summarise
 from hil.log.reader import Log
 from hil.nodes.findings import advice_on
+from hil.reports.colours import DARK, DARKENED
+from hil.reports.filter_plots import latency_panel
+from hil.reports.plots import TimeAxis
 from hil.reports.run_report import run_report
 from hil.wire.message_types import CertifiedEstimate
-from tests.hil.reports.open_page import open_page
+from hil.wire.messages import to_ns, to_time
+from tests.hil.reports.open_page import PATIENCE, open_page
 
 NAN = math.nan
 LARGEST_BYTES = 3_000_000
@@ -60,6 +68,83 @@ def test_a_report_opens_without_a_network_and_fits_the_screen(
     assert seen.width == width
     assert len(seen.inks) == len(titles(written.read_text(encoding="utf-8"))) == 20
     assert min(seen.inks) > 0  # frames, grids and letters are grey
+
+
+_AT = """
+const named = new Map([...Bokeh.documents[0].all_models].filter(m => m.name).map(m => [m.name, m]));
+return [named.get("now").location, named.get("joined").data.x.map(Number),
+  named.get("joined").data.y.map(Number), document.querySelector("[data-course='course rho']").textContent];
+"""
+_COLOURS = """
+const plot = Bokeh.documents[0].roots()[0];
+return [getComputedStyle(document.body).backgroundColor, plot.below[0].axis_label_text_color];
+"""
+
+
+@pytest.mark.slow
+def test_the_slider_moves_robots_and_cursors_and_tells_values(
+    browser: Chrome, written: Path, short_log: Log
+) -> None:
+    open_page(browser, written, 1280)
+    slider = browser.find_element(By.ID, "time")
+    slider.send_keys(Keys.HOME)
+    truth = PlotData.of(run_data_of_log(short_log)).columns.truth
+    moment, x, y, rho = browser.execute_script(_AT)
+    assert moment == pytest.approx(0.0, abs=0.01)
+    start = [truth.leader[0, :2], truth.follower[0, :2]]
+    assert [x, y] == [pytest.approx([place[axis] for place in start], abs=0.005) for axis in (0, 1)]
+    assert float(rho) == pytest.approx(truth.rho[0], abs=0.005)
+    slider.send_keys(Keys.END)
+    later, x_later, *_ = browser.execute_script(_AT)
+    assert later > moment
+    assert x_later != x
+
+
+@pytest.mark.slow
+def test_the_slider_runs_by_itself_until_it_is_stopped(browser: Chrome, written: Path) -> None:
+    open_page(browser, written, 390)
+    play = browser.find_element(By.ID, "play")
+    play.send_keys(Keys.SPACE)
+    assert play.get_attribute("aria-label") == "Pause"
+    WebDriverWait(browser, PATIENCE).until(lambda b: b.execute_script(_AT)[0] > 0.1)
+    play.send_keys(Keys.SPACE)
+    assert play.get_attribute("aria-label") == "Play"
+
+
+@pytest.mark.slow
+def test_a_page_and_its_plots_turn_dark_and_back(browser: Chrome, written: Path) -> None:
+    open_page(browser, written, 1280)
+    before = browser.execute_script(_COLOURS)
+    assert before == ["rgb(255, 255, 255)", DARK]
+    browser.find_element(By.ID, "theme").click()
+    assert browser.execute_script(_COLOURS) == ["rgb(21, 24, 28)", DARKENED[DARK]]
+    browser.find_element(By.ID, "theme").click()
+    assert browser.execute_script(_COLOURS) == before
+
+
+def test_headings_are_in_order_links_lead_somewhere_and_text_is_before_scripts(eventful: str) -> None:
+    levels = [int(level) for level in re.findall(r"<h(\d)[ >]", eventful)]
+    assert levels[0] == 1
+    assert max(later - earlier for earlier, later in itertools.pairwise(levels)) == 1
+    places = re.findall(r'<a href="#(.*?)"', eventful)
+    assert places
+    assert [place for place in places if f'id="{place}"' not in eventful] == []
+    assert eventful.index("</main>") < eventful.index("<script>")
+    assert eventful.count('role="img" aria-label="') == len(titles(eventful))
+
+
+@pytest.mark.parametrize(("late_ns", "axis"), [(0, "LinearAxis"), (2_000_000_000, "LogAxis")])
+def test_the_longest_latency_is_in_the_picture(exact_run_data: RunData, late_ns: int, axis: str) -> None:
+    commands = list(exact_run_data.commands)
+    first = commands[100]
+    issued = to_ns(first.header.stamp)
+    commands[100] = replace(first, capture=to_time(issued - late_ns - 5_000_000), fresh=True)
+    data = PlotData.of(replace(exact_run_data, commands=commands))
+    panel = latency_panel(data, TimeAxis(0.0, 4.0, 0.0))
+    assert panel is not None
+    assert panel.plot.y_axis.kind == axis
+    assert panel.plot.attributes["y_range"].attributes["end"] > (late_ns + 5_000_000) * 1e-6
+    assert any(key.label.startswith("largest") for key in panel.keys)
 
 
 def no_truth(run_data: RunData) -> RunData:
