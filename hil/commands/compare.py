@@ -8,7 +8,7 @@ import click
 
 from hil.commands.outputs import OutputFolder
 from hil.errors import CheckFailedError, UsageError
-from hil.log.report_json import print_json, print_text, results_apart
+from hil.log.report_json import print_json, results_apart, say
 
 
 @click.command("compare")
@@ -39,13 +39,12 @@ def command(paths: tuple[Path, ...], conditions: tuple[str, ...], out: Path | No
     parsed = [parsed_condition(text) for text in conditions]
     groups = groups_of(paths)
     comparison = compared(groups, failures_of(parsed, groups))
+    say(comparison_text(comparison))
     if out is not None:
         from hil.compare.compare_page import leave_comparison
 
-        click.echo(f"look at {leave_comparison(comparison, out)}", err=True)
+        say(f"look at {leave_comparison(comparison, out)}")
     if as_json:
         print_json(comparison.as_json())
-    else:
-        print_text(comparison_text(comparison))
     if comparison.failures:
         raise CheckFailedError("; ".join(failure.text for failure in comparison.failures))

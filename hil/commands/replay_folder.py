@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from hil.commands.outputs import refuse_no_folder
 from hil.commands.progress import progress
 from hil.errors import AbreastError, CheckFailedError, UsageError
-from hil.log.report_json import print_json, print_text, say
+from hil.log.report_json import print_json, say
 from hil.log.written_aside import write_text_aside
 from hil.reports.judged_log import leave, made_folder, results_in
 
@@ -51,11 +51,11 @@ def replay_folder(
         _report_worst(result, choice, place)
     write_judged(result, place)
     write_text_aside(place / "report.html", logs_report(result, place))
+    for line in _lines(result, logs_verdict(result)):
+        say(line)
     say(results_in(place))
     if as_json:
         print_json(result)
-    else:
-        print_text(_told(result, logs_verdict(result)))
     if result.get("interrupted"):
         raise KeyboardInterrupt
     if result["broken"] or result["failed"]:
@@ -91,7 +91,7 @@ def _report_worst(result: dict[str, Any], choice: ReplayChoice, place: Path) -> 
         row["report"] = f"{kept.name}/report.html"
 
 
-def _told(result: dict[str, Any], verdict: str) -> str:
+def _lines(result: dict[str, Any], verdict: str) -> list[str]:
     """What a person reads: the verdict, what is broken, and the worst with why."""
     lines = [verdict]
     broken = [f"  {row['log']}: {row['error']}" for row in result["logs"] if "error" in row]
@@ -99,4 +99,4 @@ def _told(result: dict[str, Any], verdict: str) -> str:
         lines += ["could not be judged:", *broken]
     if result["worst"]:
         lines += ["worst:", *(f"  {each['log']}: {each['why']}" for each in result["worst"])]
-    return "\n".join([*lines, ""])
+    return lines

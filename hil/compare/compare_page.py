@@ -5,17 +5,19 @@ from __future__ import annotations
 from html import escape
 from pathlib import Path
 
-from hil.compare.compare_plots import course_panels, spread_panels
+from hil.compare.compare_plots import course_panels, span_of, spread_panels
 from hil.compare.comparison import Comparison, shortened
 from hil.compare.comparison_text import is_same, metric_row
-from hil.compare.courses import course_of
+from hil.compare.courses import Course, course_of
 from hil.compare.group import RUNS
 from hil.compare.metrics import is_told
+from hil.compare.ratio_maps import labels_of_maps, ratio_maps
 from hil.log.report_json import write_json
 from hil.log.written_aside import write_text_aside
+from hil.reports.heat_maps import SWITCH, choices_html
 from hil.reports.judged_log import made_folder
-from hil.reports.page import Section, page, table_html
-from hil.reports.scroll_frame import SCROLL_STYLE, framed
+from hil.reports.page import Section, Timeline, page, table_html
+from hil.reports.scroll_frame import FRAME_STYLE, framed
 
 
 def leave_comparison(comparison: Comparison, folder: Path) -> Path:
@@ -34,6 +36,8 @@ def compare_page(comparison: Comparison) -> str:
         further = _metrics(comparison, rest, "By their names in summary.json or results.json")
         table += f"<details><summary>{len(rest)} further metrics</summary>{further}</details>"
     sections = [Section("Metrics side by side", table), Section("What differs", _differences(comparison))]
+    courses: list[Course] = []
+    script = "" if comparison.groups[0].kind == RUNS else SWITCH
     if comparison.groups[0].kind == RUNS:
         courses = [course for group in comparison.groups if (course := course_of(group)) is not None]
         of_each = "Of several runs the one with the median error. Plots over time zoom together."
@@ -45,8 +49,15 @@ def compare_page(comparison: Comparison) -> str:
                 course_panels(courses) if courses else (),
             ),
         ]
+    else:
+        first, *others = comparison.groups
+        panels = [panel for group in others for panel in ratio_maps(first, group)]
+        choices = choices_html(first.tree["cells"])
+        words = f"<p>{choices}</p>\n{labels_of_maps(first)}"
+        sections.insert(0, Section("Errors over noise", words, panels, narrow=True))
     labels = " · ".join(group.label for group in comparison.groups)
-    return page(f"{labels} – abreast", _head(comparison, labels), sections)
+    timeline = Timeline(*span_of(courses)) if courses else None
+    return page(f"{labels} – abreast", _head(comparison, labels), sections, script, timeline)
 
 
 def _head(comparison: Comparison, labels: str) -> str:
@@ -58,7 +69,7 @@ def _head(comparison: Comparison, labels: str) -> str:
         for group in comparison.groups
     )
     return (
-        f"{SCROLL_STYLE}<h1>{escape(labels)}</h1>\n"
+        f"{FRAME_STYLE}<h1>{escape(labels)}</h1>\n"
         f'<div class="{colour}"><p><strong>{escape(comparison.verdict.text)}</strong></p>'
         f"<ul>{failures}{notes}</ul></div>\n<dl>{listed}</dl>\n"
     )

@@ -39,11 +39,14 @@ _COURSES = (
 _ROW = 44
 
 
+def span_of(courses: Sequence[Course]) -> tuple[float, float]:
+    """From when to when courses that are shown together go [s]."""
+    return 0.0, max(course.last for course in courses)
+
+
 def course_panels(courses: Sequence[Course]) -> list[Panel]:
     """Panels of what is known of any of them, all over one time axis."""
-    axis = TimeAxis(
-        0.0, max(course.last for course in courses), min(course.judged_from for course in courses)
-    )
+    axis = TimeAxis(*span_of(courses), min(course.judged_from for course in courses))
     panels = []
     for kind, name, title, y_label, scale, says in _COURSES:
         lines = []
@@ -86,7 +89,6 @@ def _points(comparison: Comparison, name: str) -> Panel:
         x_range=Model("Range1d", start=low, end=high),
         y_range=Model("FactorRange", factors=labels),
     )
-    plot.set(toolbar_location=None)
     for n, group in enumerate(comparison.groups):
         known = [sample for sample in group.samples if name in sample.metrics]
         if not known:

@@ -11,6 +11,7 @@ from hil.compare.conditions import Failure
 from hil.compare.group import RUNS, Group, Spread
 from hil.compare.metrics import goal_of, in_order
 from hil.compare.verdict import Verdict, verdict_on
+from hil.reports.sweep_cells import estimators_of
 
 _MOST_VALUES = 5
 
@@ -110,7 +111,20 @@ def _notes(groups: Sequence[Group], differences: dict[str, tuple[tuple[str, ...]
         notes.append("the spread of a single run is not known: name folders of several runs to have it")
     if any(not each.facts for group in groups if group.kind == RUNS for each in group.samples):
         notes.append("of some runs the log is gone, and with it their scenario and version")
-    if left_out := [group for group in groups if len(group.samples) < len(group.tree.get("cells", ()))]:
+    foils = dict.fromkeys(name for group in groups for name in _foils(group))
+    if foils:
+        notes.append(f"cells of the foils ({', '.join(foils)}) have no part in metrics and verdict")
+    if left_out := [group for group in groups if len(group.samples) < _asked(group)]:
         names = ", ".join(group.label for group in left_out)
         notes.append(f"cells of {names} that not all of them have are left out")
     return notes
+
+
+def _foils(sweep: Group) -> list[str]:
+    return estimators_of(sweep.tree.get("cells", ()))[1]
+
+
+def _asked(sweep: Group) -> int:
+    """Cells of a sweep's estimators but for foils; 0 for runs."""
+    cells = sweep.tree.get("cells", ())
+    return sum(str(cell["estimator"]) not in _foils(sweep) for cell in cells)

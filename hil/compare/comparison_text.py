@@ -28,7 +28,7 @@ def comparison_text(comparison: Comparison) -> str:
         lines.append(f"the same in all: {', '.join(same)}")
     if more := sum(not is_told(name) for name in comparison.metrics()):
         lines.append(f"{more} metrics more with --json and in compare.html")
-    return "\n".join([*lines, ""])
+    return "\n".join(lines)
 
 
 def _with_change(labels: Sequence[str]) -> list[str]:

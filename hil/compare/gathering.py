@@ -20,7 +20,7 @@ from hil.log.log_folder import logs_in
 from hil.log.opened import opened_log
 from hil.log.reader import Log
 from hil.log.report_json import flat
-from hil.reports.sweep_cells import is_known, point_of
+from hil.reports.sweep_cells import estimators_of, is_known, point_of
 
 _EXPECTED = (
     "expected the folder of a run (summary.json), of a sweep or of judged logs (results.json), of many "
@@ -107,10 +107,13 @@ def _of_results(path: Path, file: Path, label: str) -> Group:
     spec = {key: value for key, value in tree.get("spec", {}).items() if key not in ("grid", "description")}
     told = flat({**spec, "version": tree.get("version")})
     facts = {key: _text(value) for key, value in told if value is not None}
-    alone = len({cell["estimator"] for cell in cells}) == 1
-    return Group(
-        label, path, SWEEP, tuple(_cell(n, each, facts, alone) for n, each in enumerate(cells)), tree
-    )
+    asked, _ = estimators_of(cells)
+    samples = [
+        _cell(number, cell, facts, len(asked) == 1)
+        for number, cell in enumerate(cells)
+        if str(cell["estimator"]) in asked
+    ]
+    return Group(label, path, SWEEP, tuple(samples), tree)
 
 
 def _cell(number: int, cell: Mapping[str, Any], facts: Mapping[str, str], alone: bool) -> Sample:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from hil.compare.change import Change, change_of
-from hil.compare.group import Group, Spread
+from hil.compare.group import RUNS, Group, Spread
 from hil.compare.metrics import BROKEN, HEADLINES, UNTRACKED, in_order, shown, unit_of
 from hil.judge.dotted_figures import bare
 
@@ -67,16 +67,17 @@ def _headlines(first: Group, other: Group) -> list[str]:
 
 
 def _broken(group: Group) -> dict[str, float]:
-    """What should be none, by its words, per sample of the group."""
+    """What should be none, by its words: per run, in a sweep in total."""
     found: dict[str, float] = {}
+    per = len(group.samples) if group.kind == RUNS else 1
     for name in group.metrics:
         for pattern, words in BROKEN.items():
             if fnmatchcase(bare(name), pattern) and (total := sum(group.values(name))):
-                found[words] = found.get(words, 0.0) + total / len(group.samples)
+                found[words] = found.get(words, 0.0) + total / per
     for name, tracked in UNTRACKED.items():
         lost = sum(group.values(name))
         if lost > _LOST_TRACK * (lost + sum(group.values(tracked))):
-            found["estimates that did not say tracking"] = lost / len(group.samples)
+            found["estimates that did not say tracking"] = lost / per
     return found
 
 
@@ -95,17 +96,26 @@ def _count(number: float) -> str:
 
 def _reasons(worse: Group, better: Group) -> str:
     """Headlines with their change, those that speak for the better one first."""
-    told = []
-    for name in _headlines(worse, better):
-        change = change_of(name, worse, better)
-        ratio = None if change is None else change.ratio
-        if change is not None and ratio is not None and _NEGLIGIBLE < abs(ratio - 1.0) < math.inf:
-            told.append((ratio, _told(name, worse, better, change)))
+    told = [
+        (change.ratio or 0.0, _told(name, worse, better, change)) for name, change in _changes(worse, better)
+    ]
     gains = [text for ratio, text in told if ratio <= 1.0]
     losses = [text for ratio, text in told if ratio > 1.0]
     if gains and losses:
         return f"{', '.join(gains)}; but {', '.join(losses)}"
     return ", ".join(gains or losses)
+
+
+def _changes(worse: Group, better: Group) -> list[tuple[str, Change]]:
+    """Headlines that changed by more than is negligible."""
+    found = [(name, change_of(name, worse, better)) for name in _headlines(worse, better)]
+    return [
+        (name, change)
+        for name, change in found
+        if change is not None
+        and change.ratio is not None
+        and _NEGLIGIBLE < abs(change.ratio - 1.0) < math.inf
+    ]
 
 
 def _but(first: Group, second: Group) -> str:
@@ -118,21 +128,22 @@ def _told(name: str, worse: Group, better: Group, change: Change) -> str:
     unit = f" {unit_of(name)[0]}".rstrip()
     whose = f" of {name.split('.')[1]}" if bare(name) != name else ""
     percent = f"{100.0 * ((change.ratio or 0.0) - 1.0):+.0f} %"
-    return (
-        f"{HEADLINES[bare(name)]}{whose} {shown(name, new)} instead of {shown(name, old)}{unit} ({percent})"
-    )
+    if change.pairs and not math.isclose(new, old * (change.ratio or 0.0), rel_tol=0.1):
+        percent += " in the median of the pairs"
+    values = f"{shown(name, new)} instead of {shown(name, old)}{unit}"
+    return f"{HEADLINES[bare(name)]}{whose} {values} ({percent})"
 
 
 def _trust(worse: Group, better: Group) -> str:
     """How far chance may have done it."""
     if min(len(worse.samples), len(better.samples)) == 1:
         return "; with one run on a side the spread is not known"
-    changes = [change_of(name, worse, better) for name in _headlines(worse, better)]
-    known = [each for each in changes if each is not None]
+    known = [change for _, change in _changes(worse, better)]
     tested = [each for each in known if each.chance is not None]
     if tested:
         sure = sum(not each.may_be_chance for each in tested)
-        return f"; {sure} of {len(tested)} changes are more than chance (5 % level)"
+        which = "more than" if sure == len(tested) else f"{sure} of {len(tested)} more than"
+        return f"; {which} chance (at 5 %)"
     pairs = [each for each in known if each.pairs]
     if pairs:
         wins, count = min(each.better_in for each in pairs), pairs[0].pairs

@@ -52,6 +52,11 @@ def unjudged(cell: Cell, tip: str, href: str) -> Look:
     return Look(_PALE, _BLACK, _marked("–", href), f"not known; {tip}", _PLAIN, href)
 
 
+def marked_lost(text: str, tip: str) -> Look:
+    """A cell that is compared with another, of which runs of one diverged or nothing is known."""
+    return Look(_PALE, _BLACK, text, tip, _LINES if DIVERGED in text else _PLAIN, "#")
+
+
 def legend_html() -> str:
     """What colours and hatchings mean, in words and samples."""
     stops = ", ".join(Cividis256[place] for place in (255, 191, 127, 63, 0))
@@ -74,8 +79,8 @@ def legend_html() -> str:
         f'<ul class="keys">{listed}<li>{KEPT} a run is kept</li></ul>\n'
         '<p class="soft">Tap a cell for its run where one is kept, else for its row in the table of all '
         "cells. One colour scale holds for all latencies and losses, from the best to the worst of the "
-        "estimators asked about. Cells with diverged runs have no colour: their errors are those of the time "
-        "before. Empty places were not in the sweep.</p>"
+        "estimators asked about. Cells with diverged runs have no colour: their errors are only those "
+        "of what still tracked. Empty places were not in the sweep.</p>"
     )
 
 

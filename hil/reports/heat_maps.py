@@ -123,8 +123,7 @@ def heat_maps(cells: Sequence[Cell], merit: Merit) -> list[Panel]:
     Colours are of cells none of whose runs diverged; the others are marked as what they are. The scale is
     that of the estimators asked about.
     """
-    rows = _labels(cells, "sigma_position", lambda each: f"{1e3 * each:g}")
-    columns = _labels(cells, "sigma_heading", _degrees)
+    rows, columns = noise_labels(cells, "sigma_position"), noise_labels(cells, "sigma_heading")
     asked, foils = estimators_of(cells)
     sound = [cell for cell in cells if is_sound(cell) and str(cell["estimator"]) in asked]
     panels = []
@@ -153,9 +152,10 @@ def heat_maps(cells: Sequence[Cell], merit: Merit) -> list[Panel]:
     return panels
 
 
-def _labels(cells: Sequence[Cell], axis: str, tell: Callable[[float], str]) -> dict[float, str]:
-    """Values of an axis in order, with what they are called."""
-    return {value: tell(value) for value in sorted({float(cell[axis]) for cell in cells})}
+def noise_labels(cells: Sequence[Cell], axis: str) -> dict[float, str]:
+    """Noise that occurs in order, with what it is called: positions in mm, headings in degrees."""
+    scale = math.degrees(1.0) if axis == "sigma_heading" else 1e3
+    return {value: f"{scale * value:.3g}" for value in sorted({float(cell[axis]) for cell in cells})}
 
 
 def noise_map(
@@ -169,7 +169,6 @@ def noise_map(
         x_range=Model("FactorRange", factors=list(columns)),
         y_range=Model("FactorRange", factors=list(rows)),
     )
-    plot.set(toolbar_location=None)
     for grid in plot.grids:
         grid.set(grid_line_color=None)
     source, place = source_of(data), {"x": Field("column"), "y": Field("row")}
@@ -181,7 +180,7 @@ def noise_map(
         fill_color=Field("fill"),
         line_color=Value(None),
         hatch_pattern=Field("hatch"),
-        hatch_color=Value("#000000"),
+        hatch_color=Value("#101010"),
         hatch_alpha=Value(0.2),
         hatch_scale=Value(9.0),
         hatch_weight=Value(1.0),
@@ -214,10 +213,6 @@ def _scale(values: Sequence[float | None]) -> tuple[float, float]:
     if not len(positive):
         return 0.0, 0.0
     return math.log(float(positive.min())), math.log(float(positive.max()))
-
-
-def _degrees(angle: float) -> str:
-    return f"{math.degrees(angle):.3g}"
 
 
 def _choice(name: str, label: str, options: Mapping[str, str]) -> str:

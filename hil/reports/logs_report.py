@@ -16,7 +16,7 @@ from hil.reports.page import Section, page
 from hil.reports.plot_models import Field, Model, Value, source_of
 from hil.reports.plots import Panel, blank, hover
 from hil.reports.run_tables import QUANTITIES, scale_of
-from hil.reports.scroll_frame import SCROLL_STYLE, framed_rows
+from hil.reports.scroll_frame import FRAME_STYLE, framed_rows
 
 _UNITS = {
     "estimation.rmse.v1": (QUANTITIES["v1"][1], scale_of("v1")),
@@ -82,7 +82,7 @@ def _head(result: Mapping[str, Any], root: Path) -> str:
     first = result["worst"][0] if result["worst"] else None
     worst = f"<ul><li>Worst: {escape(first['log'])}: {escape(first['why'])}</li></ul>" if first else ""
     return (
-        f'{SCROLL_STYLE}<h1>{escape(root.name)}</h1>\n<div class="verdict{" bad" * bad}">'
+        f'{FRAME_STYLE}<h1>{escape(root.name)}</h1>\n<div class="verdict{" bad" * bad}">'
         f"<p><strong>{escape(logs_verdict(result))}</strong></p>{worst}</div>\n<dl>{listed}</dl>\n"
     )
 
@@ -99,12 +99,12 @@ class _Table:
         """Rows at some places with what is said of each; empty without any."""
         header = ("log", "what stands out", *(headlines_of({}) if figures else ()), "a closer look")
         lines = [self._line(place, text, figures=figures, anchors=anchors) for place, text in told]
-        return framed_rows("", header, lines)
+        return framed_rows("", header, lines).replace('class="wide firm"', 'class="wide firm told"')
 
     def _line(self, place: int, text: str, *, figures: bool, anchors: bool) -> str:
         row = self.rows[place]
         name, mark = escape(str(row["log"])), f' id="log-{place}"' if anchors else ""
-        said = f'<td style="text-align:left;white-space:normal;min-width:14rem">{escape(text)}</td>'
+        said = f'<td class="said">{escape(text)}</td>'
         shown = headlines_of(row).values() if figures else ()
         links = [f'<a href="{_address(self.root / str(row["log"]), self.folder)}">log</a>']
         if "report" in row:
@@ -138,7 +138,6 @@ def _panels(rows: Sequence[Mapping[str, Any]]) -> list[Panel]:
             x_range=Model("Range1d", start=-3.0, end=103.0),
             y_range=Model("Range1d", start=0.0, end=1.08 * values[-1] or 1.0),
         )
-        plot.set(toolbar_location=None)
         source = source_of(
             {
                 "x": [100.0 * n / (len(known) - 1) for n in range(len(known))],

@@ -14,7 +14,7 @@ from hil.reports.cell_looks import legend_html
 from hil.reports.cell_table import cell_table, tightest
 from hil.reports.heat_maps import MERITS, SWITCH, choices_html, heat_maps, slice_name, slice_of
 from hil.reports.page import Section, page, table_html
-from hil.reports.scroll_frame import SCROLL_STYLE, framed
+from hil.reports.scroll_frame import FRAME_STYLE, framed
 from hil.reports.sweep_cells import Cell, estimators_of, is_known, is_sound, point_of
 from hil.reports.sweep_verdict import FORMS, sweep_verdict, violations
 
@@ -59,7 +59,7 @@ def _head(results: Mapping[str, Any]) -> str:
     listed = "".join(f"<dt>{name}</dt><dd>{escape(text)}</dd>" for name, text in facts.items())
     others = "".join(f"<li>{escape(text)}</li>" for text in verdict.others)
     return (
-        f'{SCROLL_STYLE}<h1>Sweep over noise</h1>\n<div class="verdict{" bad" if verdict.bad else ""}">'
+        f'{FRAME_STYLE}<h1>Sweep over noise</h1>\n<div class="verdict{" bad" if verdict.bad else ""}">'
         f"<p><strong>{escape(verdict.text)}</strong></p>"
         + (f"<ul>{others}</ul>" if others else "")
         + f"</div>\n<dl>{listed}</dl>\n"
