@@ -13,7 +13,7 @@ from hil.scene.markers import Brush, Colour, Marker, Point, circle, ellipse, on_
 from hil.scene.robot_size import BODY_DIAMETER, HEIGHT, WHEEL_DIAMETER, WHEEL_OFFSET, WHEEL_WIDTH, WIDTH
 
 LEADER, FOLLOWER = Colour(0.12, 0.37, 0.66), Colour(0.85, 0.45, 0.10)
-_WHEEL, _LINE = Colour(0.2, 0.2, 0.2), Colour(0.55, 0.55, 0.55)
+_WHEEL, _LINE, _NOSE = Colour(0.2, 0.2, 0.2), Colour(0.55, 0.55, 0.55), Colour(1.0, 1.0, 1.0)
 _GOOD, _BOUND, _BAD = Colour(0.13, 0.55, 0.25), Colour(0.55, 0.25, 0.65), Colour(0.80, 0.15, 0.15)
 
 _NOSE_Z, _ABOVE, _TEXT_Z = HEIGHT + 0.01, HEIGHT + 0.02, HEIGHT + 0.05
