@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import logging
 import time
 from collections.abc import Iterable
 from typing import Any
@@ -76,6 +77,8 @@ class FoxgloveBridge:
 
 
 def _sdk() -> Any:
+    # That a viewer went away is nothing to tell; what keeps us from serving is raised.
+    logging.getLogger("foxglove").setLevel(logging.CRITICAL)
     try:
         return importlib.import_module("foxglove")
     except ModuleNotFoundError as error:

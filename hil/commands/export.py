@@ -128,6 +128,8 @@ def _tell(done: TableExport, *, as_json: bool) -> None:
     for topic, count in done.topics.malformed.items():
         click.echo(f"topic {topic}: {count} payloads are no message of its type, and left out", err=True)
     _tell_left_out(done.topics.left_out)
+    if done.older:
+        click.echo(f"still there from an export before: {', '.join(done.older)}", err=True)
     told: dict[str, Any] = done.as_dict()
     if as_json:
         print_json(told)

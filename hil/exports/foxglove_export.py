@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from heapq import merge
 from pathlib import Path
 
-from hil.exports.foxglove_file import FILE, FoxgloveExport, write_foxglove
+from hil.exports.foxglove_file import FILE, RECORDED, FoxgloveExport, Made, write_foxglove
 from hil.exports.layouts import write_layouts
 from hil.exports.sources import of_what_is_whole, recorded_links
 from hil.judge.replayed import ReplayChoice, Replayed, replayed
@@ -31,18 +31,23 @@ def export_foxglove(log: Log, folder: Path, choice: ReplayChoice) -> FoxgloveExp
 
 def _export(log: Log, folder: Path, choice: ReplayChoice) -> FoxgloveExport:
     own = scenario_of(log)
-    made: Iterator[Outgoing] = iter(())
     if own is not None and recorded_links(log, choice):
-        scenario, told = own, True
+        scenario, made = own, RECORDED
     else:
         done = replayed(log, choice)
-        scenario, told = done.scenario, choice.chart is None
-        made = _estimates(done) if told else _of_foreign(log, done, scenario, choice)
-    exported = write_foxglove(log, scenario, folder / FILE, made, told=told)
+        scenario, made = done.scenario, _made(log, done, choice)
+    exported = write_foxglove(log, scenario, folder / FILE, made)
     links = links_of(scenario)
     chosen = [link for link in links if link.follower == choice.follower]
     write_layouts(folder, (chosen or links)[0])
     return exported
+
+
+def _made(log: Log, done: Replayed, choice: ReplayChoice) -> Made:
+    instead = frozenset(link_topics(played.link).estimate for played in done.played)
+    if choice.chart is None:
+        return Made(_estimates(done), instead)
+    return Made(_of_foreign(log, done, done.scenario, choice), instead, alone=True)
 
 
 def _estimates(done: Replayed) -> Iterator[Outgoing]:

@@ -40,30 +40,43 @@ class FoxgloveExport:
         }
 
 
-def write_foxglove(
-    log: Log, scenario: Scenario, path: Path, made: Iterable[Outgoing] = (), *, told: bool = True
-) -> FoxgloveExport:
+@dataclass(frozen=True, slots=True)
+class Made:
+    """Messages that a replay has made, by their stamps in log time.
+
+    ``instead``: topics on which these take the place of the log's own messages; all else is for the scene
+    alone. ``alone``: whether the scene is made of nothing else, as the log has other topics than ours.
+    """
+
+    messages: Iterable[Outgoing] = ()
+    instead: frozenset[str] = frozenset()
+    alone: bool = False
+
+
+RECORDED = Made()
+"""Nothing made: all is in the log."""
+
+
+def write_foxglove(log: Log, scenario: Scenario, path: Path, made: Made = RECORDED) -> FoxgloveExport:
     """Write all messages of a log, and what the scene of a scenario is, in the order of log time.
 
-    ``made``: messages besides, by their stamps in log time, for the scene; those on topics that the log lacks
-    are written too. ``told``: whether the log's own topics are those of the scenario. Raises
-    :class:`UsageError` for a damaged log, or if the file cannot be written.
+    Raises :class:`UsageError` for a damaged log, or if the file cannot be written.
     """
     done = FoxgloveExport(path, damage=log.damage)
     scene = LabScene(scenario)
-    own = {ros_name(topic) for topic in log.topics}
-    besides = iter(made)
+    besides = iter(made.messages)
+    topics = [topic for topic in _readable(log, done) if topic.strip("/") not in made.instead]
     with _mcap(path) as writer:
         channels = _Channels(writer, log.definitions, done)
         waiting = next(besides, None)
-        for record in log.records(_readable(log, done)):
+        for record in log.records(topics):
             while waiting is not None and waiting.stamp_ns <= record.log_ns:
-                if ros_name(waiting.topic) not in own:
+                if waiting.topic in made.instead:
                     channels.add(waiting.topic, waiting.typename, waiting.payload, waiting.stamp_ns)
                 channels.add_all(scene.hear(waiting.topic, waiting.payload, waiting.stamp_ns))
                 waiting = next(besides, None)
             channels.add(record.topic, record.typename, record.payload, record.log_ns, record.publish_ns)
-            if told:
+            if not made.alone:
                 channels.add_all(scene.hear(record.topic, record.payload, record.log_ns))
     return done
 

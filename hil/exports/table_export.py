@@ -31,7 +31,7 @@ class TableExport:
     """What was written: rows of the aligned table by follower, and the tables of topics.
 
     ``estimates``: whether its estimates are those of the log, ``recorded``, or ``replayed``, made anew.
-    ``damage``: what is gone of the log.
+    ``damage``: what is gone of the log. ``older``: tables that lie there from an export before.
 
     >>> import abreast
     >>> scenario = abreast.load_scenario("turtlebot3", {"run.duration_s": 2.0})
@@ -47,6 +47,7 @@ class TableExport:
     rows: dict[str, int] = field(default_factory=dict)
     topics: TopicTables = field(default_factory=TopicTables)
     damage: str = ""
+    older: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
         """The same as JSON."""
@@ -58,6 +59,7 @@ class TableExport:
             "malformed": self.topics.malformed,
             "left_out": self.topics.left_out,
             "damage": self.damage or None,
+            "older": self.older,
         }
 
 
@@ -90,7 +92,17 @@ def _export(log: Log, folder: Path, form: Format, choice: ReplayChoice) -> Table
     if form == "csv":
         _describe(folder / COLUMNS)
     done.topics = write_topics(log, folder / TOPICS, form)
+    done.older = _older(done)
     return done
+
+
+def _older(done: TableExport) -> list[str]:
+    """Tables in the folder that this export has not written."""
+    folder = done.folder
+    written = {folder / f"aligned.{done.form}", *(folder / TOPICS / name for name in done.topics.rows)}
+    there = [*folder.glob("aligned.*"), *(folder / TOPICS).rglob("*.*")]
+    tables = {path for path in there if path.suffix in (".csv", ".parquet")}
+    return sorted(str(path) for path in tables - written)
 
 
 def _runs(log: Log, links: Sequence[Link], choice: ReplayChoice) -> Iterator[LoggedRun]:

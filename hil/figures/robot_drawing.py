@@ -11,12 +11,11 @@ from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 
 from formation.angles import FloatArray
+from hil.scene.robot_size import BODY_DIAMETER, WHEEL_DIAMETER, WHEEL_OFFSET, WHEEL_WIDTH
 
 LEADER, FOLLOWER, LINE = "#1f5fa8", "#d9741a", "#8a8a8a"
 
-# TurtleBot3 Burger: 0.138 m long, 0.178 m over its wheels.
-_BODY_RADIUS = 0.069
-_WHEEL_LENGTH, _WHEEL_WIDTH, _WHEEL_OFFSET = 0.066, 0.02, 0.079
+_BODY_RADIUS = 0.5 * BODY_DIAMETER
 _NOSE = ((0.05, 0.0), (-0.034, 0.036), (-0.016, 0.0), (-0.034, -0.036))
 _STEPS = tuple(base * 10.0**power for power in range(-1, 5) for base in (1.0, 2.0, 5.0))
 _MOST_MOMENTS = 7
@@ -52,8 +51,8 @@ def draw_robot(axes: Axes, pose: FloatArray, scale: float, colour: str, opacity:
     """One robot at a pose x, y, theta: wheels, body, nose ahead. ``scale`` 1 is true size."""
     x, y, theta = (float(value) for value in pose)
     place = Affine2D().scale(scale).rotate(theta).translate(x, y)
-    for side in (_WHEEL_OFFSET, -_WHEEL_OFFSET):
-        half_length, half_width = 0.5 * _WHEEL_LENGTH, 0.5 * _WHEEL_WIDTH
+    for side in (WHEEL_OFFSET, -WHEEL_OFFSET):
+        half_length, half_width = 0.5 * WHEEL_DIAMETER, 0.5 * WHEEL_WIDTH
         corners = [
             (-half_length, side - half_width),
             (half_length, side - half_width),

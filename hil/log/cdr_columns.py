@@ -68,7 +68,7 @@ class Field(NamedTuple):
 
 
 def fields_of(store: Typestore, typename: str) -> list[Field]:
-    """The columns of a type, in their order. Raises :class:`UsageError` for a type that has none."""
+    """The columns of a type, in their order. Raises :class:`UsageError` for one that is not known or read."""
     return list(_fields(store, typename, ""))
 
 
@@ -84,6 +84,8 @@ def _fields_of(store: Typestore, desc: FieldDesc, name: str, of: tuple[str, str]
         else:
             yield from _fields(store, desc[1], f"{name}.")
     elif desc[0] == Nodetype.BASE:
+        if desc[1][0] != "string":
+            _kind(desc[1][0])
         yield Field(name, False, of)
     elif desc[0] == Nodetype.ARRAY and desc[1][1] <= MOST_NUMBERED:
         for number in range(desc[1][1]):

@@ -10,14 +10,12 @@ from formation.angles import wrap
 from formation.pose import Pose
 from formation.station import Station
 from hil.scene.markers import Brush, Colour, Marker, Point, circle, ellipse, on_ray, sector
+from hil.scene.robot_size import BODY_DIAMETER, HEIGHT, WHEEL_DIAMETER, WHEEL_OFFSET, WHEEL_WIDTH, WIDTH
 
 LEADER, FOLLOWER = Colour(0.12, 0.37, 0.66), Colour(0.85, 0.45, 0.10)
-_WHEEL, _LINE = Colour(0.2, 0.2, 0.2), Colour(0.55, 0.55, 0.55)
+_WHEEL, _LINE, _NOSE = Colour(0.2, 0.2, 0.2), Colour(0.55, 0.55, 0.55), Colour(1.0, 1.0, 1.0)
 _GOOD, _BOUND, _BAD = Colour(0.13, 0.55, 0.25), Colour(0.55, 0.25, 0.65), Colour(0.80, 0.15, 0.15)
 
-# TurtleBot3 Burger: 0.138 m long, 0.178 m wide over its wheels, 0.192 m high.
-BODY, HEIGHT, WIDTH = 0.138, 0.192, 0.178
-_WHEEL_DIAMETER, _WHEEL_WIDTH = 0.066, 0.020
 _NOSE_Z, _ABOVE, _TEXT_Z = HEIGHT + 0.01, HEIGHT + 0.02, HEIGHT + 0.05
 AHEAD_S = 1.0
 """The estimated velocity is drawn as the way of so many seconds."""
@@ -74,11 +72,12 @@ class SeenPair:
 
 def robot_markers(brush: Brush, colour: Colour) -> Iterator[Marker]:
     """A robot in its true size, in its own frame."""
-    yield brush.cylinder(0, (0.0, 0.0), HEIGHT, (BODY, BODY), colour.faint(0.85))
-    aside = 0.5 * (WIDTH - _WHEEL_WIDTH)
-    for number, y in enumerate((aside, -aside), 1):
-        yield brush.wheel(number, (0.0, y), _WHEEL_DIAMETER, _WHEEL_WIDTH, _WHEEL)
-    yield brush.arrow(3, (-0.3 * BODY, 0.0), (0.45 * BODY, 0.0), _NOSE_Z, 0.018, Colour(1.0, 1.0, 1.0))
+    yield brush.cylinder(0, (0.0, 0.0), HEIGHT, (BODY_DIAMETER, BODY_DIAMETER), colour.faint(0.85))
+    for number, y in enumerate((WHEEL_OFFSET, -WHEEL_OFFSET), 1):
+        yield brush.wheel(number, (0.0, y), WHEEL_DIAMETER, WHEEL_WIDTH, _WHEEL)
+    yield brush.arrow(
+        3, (-0.3 * BODY_DIAMETER, 0.0), (0.45 * BODY_DIAMETER, 0.0), _NOSE_Z, 0.018, Colour(1.0, 1.0, 1.0)
+    )
 
 
 def pair_markers(brush: Brush, seen: SeenPair) -> Iterator[Marker]:

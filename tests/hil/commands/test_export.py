@@ -35,6 +35,11 @@ def test_it_says_on_stdout_what_it_wrote(
     code, out, err = said(capsys, short_log.path, "--to", tmp_path / "out", "--overwrite", "--json")
     assert code == 0
     assert json.loads(out)["aligned"] == str(tmp_path / "out/aligned.parquet")
+    assert err == ""
+    code, out, err = said(capsys, short_log.path, "--to", tmp_path / "out", "--overwrite", "--format", "csv")
+    assert code == 0
+    assert "still there from an export before" in err
+    assert str(tmp_path / "out/topics/truth.parquet") in err
 
 
 def test_without_pyarrow_tables_are_csv(
@@ -59,3 +64,26 @@ def test_a_damaged_log_leaves_what_is_whole_and_exits_with_1(
     assert code == 1
     assert "damaged" in err.splitlines()[-1]
     assert (tmp_path / "out/aligned.parquet").is_file()
+
+
+def test_layouts_alone_need_no_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = said(capsys, "--layouts", tmp_path / "layouts")
+    assert code == 0
+    assert [Path(line).name for line in out.splitlines()] == ["foxglove.json", "plotjuggler.xml"]
+    assert all(Path(line).is_file() for line in out.splitlines())
+    code, out, err = said(capsys)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+
+
+def test_a_file_for_viewers_is_not_written_over(
+    short_log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = (short_log.path, "--to", tmp_path / "out", "--format", "foxglove")
+    code, out, err = said(capsys, *arguments)
+    assert (code, err) == (0, "")
+    assert out.startswith(f"{tmp_path / 'out/foxglove.mcap'}: ")
+    code, _, err = said(capsys, *arguments)
+    assert code == 2
+    assert "--overwrite" in err
+    code, out, _ = said(capsys, *arguments, "--overwrite", "--json")
+    assert json.loads(out)["messages"]["/truth"] == short_log.counts["truth"]

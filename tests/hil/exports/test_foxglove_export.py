@@ -189,3 +189,16 @@ def test_a_foreign_log_gets_its_estimates_and_its_scene(short_log: Log, tmp_path
     assert done.messages["/follower/leader_estimate"] > 300
     scenes = [message for topic, message in decoded(tmp_path / "out/foxglove.mcap") if topic == "/scene"]
     assert any("tracking" in marker.text for marker in scenes[len(scenes) // 2].markers)
+
+
+def test_estimates_made_anew_take_the_place_of_those_of_the_log(
+    short_log: Log, folder: Path, tmp_path: Path
+) -> None:
+    export_foxglove(short_log, tmp_path, dataclasses.replace(RECORDED, estimator="difference"))
+    topic = "/follower/leader_estimate"
+    before, anew = (
+        [message.v1 for name, message in decoded(each / "foxglove.mcap") if name == topic]
+        for each in (folder, tmp_path)
+    )
+    assert len(before) == len(anew)
+    assert before != anew

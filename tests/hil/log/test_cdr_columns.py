@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from hil.errors import UsageError
@@ -111,3 +112,10 @@ def test_there_may_be_no_payload_at_all() -> None:
 def test_an_unknown_type_is_refused() -> None:
     with pytest.raises(UsageError, match="not known"):
         fields_of(known_types(), "no_msgs/msg/None")
+
+
+def test_a_field_that_nobody_reads_is_refused_beforehand() -> None:
+    store = get_typestore(Stores.EMPTY)
+    store.register({"a_msgs/msg/A": ([], [("deep", (Nodetype.BASE, ("float128", 0)))])})
+    with pytest.raises(UsageError, match="'float128' are not supported"):
+        fields_of(store, "a_msgs/msg/A")

@@ -13,7 +13,7 @@ from hil.nodes.node import Outgoing
 from hil.scenario.files import load_scenario
 from hil.scene.lab_scene import SCENE, TF, WORLD, LabScene
 from hil.scene.markers import Marker, MarkerArray
-from hil.scene.pair_scene import HEIGHT, WIDTH
+from hil.scene.robot_size import HEIGHT, WIDTH
 from hil.wire.message_types import (
     Command,
     LeaderEstimate,
