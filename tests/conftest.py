@@ -15,6 +15,7 @@ settings.register_profile("explore", patient, max_examples=1000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeat"))
 
 SLOWEST = (
+    "tests/docs/test_commands.py",
     "tests/hil/live/test_run.py",
     "tests/estimation/tracking/test_tracker.py",
     "tests/hil/sweep/test_results.py",
