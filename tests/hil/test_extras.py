@@ -87,6 +87,15 @@ def test_setting_up_brings_every_extra_that_this_python_can_have() -> None:
     assert set(EXTRA_OF.values()) - held == {"mocap", "ros"}
 
 
+def test_the_page_on_installing_has_every_extra_with_its_libraries() -> None:
+    page = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+    rows = {row[1]: row[0] for row in re.findall(r"^(\| `(\w+)` \|.*)$", page, re.MULTILINE)}
+    for name, extra in EXTRA_OF.items():
+        assert extra in rows, f"{extra}, which brings {name}, is not in docs/install.md"
+        brings = names_of(PROJECT["optional-dependencies"][extra])
+        assert extra == "ros" or all(f"`{each}`" in rows[extra] for each in brings), extra
+
+
 def test_no_command_needs_an_extra_to_begin() -> None:
     modules = [f"hil.commands.{path.stem}" for path in (ROOT / "hil" / "commands").glob("[!_]*.py")]
     lazy = ("simulate", "judge", "sweep", "replay", "nodes", "live", "lockstep", "doctor", "soak", "faults")
