@@ -33,7 +33,7 @@ class Block(NamedTuple):
     def commands(self) -> list[str]:
         """Lines that begin with ``abreast``, comments taken off."""
         lines = [re.sub(r"\s+#\s.*$", "", line) for line in self.text.splitlines()]
-        return [line for line in lines if re.match(r"abreast [a-z]", line)]
+        return [line for line in lines if re.match(r"abreast [a-z]+(\s|$)", line)]
 
     @property
     def file(self) -> str:

@@ -74,6 +74,10 @@ def runnable(block: Block) -> bool:
     return block.marker != "hardware" and any(not LAB.search(line) for line in block.commands)
 
 
+def is_python(block: Block) -> bool:
+    return block.language == "python" and not block.file
+
+
 def finite(line: str, router: str) -> str:
     """A line of a page that ends soon; in a lab on loopback, where there is a ``router``, that one's."""
     context, left = command_of(abreast, words_of(line))
@@ -144,9 +148,11 @@ def test_the_commands_of_a_page_run_in_their_order(page: Path, tmp_path: Path) -
         if block.file:
             (tmp_path / block.file).write_text(block.text, encoding="utf-8")
     with lab(tmp_path) as started:
-        for block in filter(runnable, blocks(page)):
+        for block in [each for each in blocks(page) if runnable(each) or is_python(each)]:
             if block.marker == "end of daemons":
                 started.end()
+            if is_python(block):
+                run_python(block, tmp_path)
             for line in block.commands:
                 if block.marker == "daemons":
                     started.begin(line)
@@ -156,8 +162,16 @@ def test_the_commands_of_a_page_run_in_their_order(page: Path, tmp_path: Path) -
 
 
 def run(line: str, folder: Path, where: str) -> None:
+    ended(["bash", "-c", line], folder, f"{where}\n{line}")
+
+
+def run_python(block: Block, folder: Path) -> None:
+    ended([sys.executable, "-c", block.text], folder, f"{block.page.name}:{block.line}")
+
+
+def ended(words: list[str], folder: Path, where: str) -> None:
     done = subprocess.run(
-        ["bash", "-c", line],
+        words,
         cwd=folder,
         env=environment(),
         capture_output=True,
@@ -165,10 +179,10 @@ def run(line: str, folder: Path, where: str) -> None:
         timeout=400,
         check=False,
     )
-    assert done.returncode == 0, f"{where}\n{line}\n{done.stdout}\n{done.stderr}"
+    assert done.returncode == 0, f"{where}\n{done.stdout}\n{done.stderr}"
 
 
-PYTHON = [block for block in ALL if block.language == "python" and not block.file]
+PYTHON = [block for block in ALL if is_python(block) and block.page not in PAGES_RUN]
 
 
 @pytest.mark.parametrize("block", PYTHON, ids=[f"{block.page.name}:{block.line}" for block in PYTHON])

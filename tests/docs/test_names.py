@@ -16,6 +16,8 @@ from msgspec import Struct
 from msgspec.structs import fields
 
 from hil.command_line import abreast
+from hil.exports.aligned_columns import ALIGNED_COLUMNS
+from hil.log.origin import MADE as MADE_RECORD
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
 from hil.wire.topics import LOG
@@ -32,13 +34,13 @@ TOPICS = {LOG, "abreast/rigid_bodies"}
 ERRORS = ROOT / "hil" / "errors.py"
 """Errors, which are called by their name everywhere."""
 
-GROUPS = {"abreast.laws", "abreast.estimators"}
-"""Entry points, by which packages of others give names to laws and estimators."""
+GROUPS = {"abreast.laws", "abreast.estimators", MADE_RECORD}
+"""Entry points, by which packages of others give names to laws and estimators, and records of a log."""
 
-OTHERS = {"enable_stamped_cmd_vel", "rmw_zenoh_cpp", "rmw_zenohd"}
-"""Names of other people's programs and parameters."""
+OTHERS = {"SceneUpdate", "enable_stamped_cmd_vel", "rmw_zenoh_cpp", "rmw_zenohd"}
+"""Names of other people's programs, parameters and messages."""
 
-JOINED = {"mount.leader_x_mm"}
+JOINED = {"mount.leader_x_mm", *(column.name for column in ALIGNED_COLUMNS)}
 """Names that code puts together."""
 
 
@@ -100,6 +102,14 @@ def summary_keys() -> set[str]:
     return set(re.findall(r"`(\w+\.[\w.]+)`", page))
 
 
+def is_summary_key(dotted: str) -> bool:
+    """Whether a summary has this key, or keys below it; what stands in capitals on its page is any name."""
+    return any(
+        key.startswith(dotted) or re.fullmatch(re.sub(r"[A-Z]{2,}", r"\\w+", re.escape(key)), dotted)
+        for key in summary_keys()
+    )
+
+
 def wrong_path(code: str) -> str:
     """What is wrong with a path below this folder; empty if nothing is, or if it is none."""
     head = code.split()[0]
@@ -131,7 +141,7 @@ def wrong_dotted(code: str) -> str:
     if parts[-1] in ("py", "msg", "ipynb"):
         name = dotted[0]
         return "" if name in saved() or any(ROOT.glob(f"[!.]*/**/{name}")) else f"{name} is not there"
-    if dotted[0] in JOINED or any(key.startswith(dotted[0]) for key in summary_keys()):
+    if dotted[0] in JOINED or is_summary_key(dotted[0]):
         return ""
     if (first in PACKAGES and len(parts) > 1) or first == "abreast":
         return "" if resolved(dotted[0], "") else f"{dotted[0]} is not there"
@@ -145,7 +155,7 @@ def wrong_word(code: str) -> str:
     """That nothing has this name: one with an underscore, or with capitals within."""
     name = re.fullmatch(r"(\w+)(?:\(.*\))?", code)
     plain = not name or not re.search(r"[a-z0-9]_[a-z]|[a-z][A-Z]", name[1])
-    if name is None or plain or name[1] in words():
+    if name is None or plain or name[1] in words() | JOINED:
         return ""
     return f"nothing is called {name[1]}"
 
