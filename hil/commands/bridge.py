@@ -12,6 +12,7 @@ from formation.collector import collector_paused
 from hil.bridge.seen_frame import Up
 from hil.commands.command_group import CommandGroup
 from hil.commands.seconds import DURATION
+from hil.commands.whole_numbers import Whole
 from hil.commands.wire_options import endpoints_of, wire_options
 from hil.log.report_json import note
 from hil.scenario.files import load_scenario
@@ -105,7 +106,7 @@ def bridge_ros2(**given: Unpack[_Given]) -> None:
 
 
 @command.command("foxglove", params=_options())
-@click.option("--port", type=click.IntRange(0, 65535), default=8765, show_default=True, help="0: any free.")
+@click.option("--port", type=Whole(0, 65535), default=8765, show_default=True, help="0: any free.")
 @click.option("--address", default="127.0.0.1", show_default=True, help="Others than loopback let all look.")
 def bridge_foxglove(port: int, address: str, **given: Unpack[_Given]) -> None:
     """Serve what passes in the lab of SCENARIO to Foxglove or Lichtblick: topics, transforms, a 3D scene.

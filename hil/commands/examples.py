@@ -13,6 +13,19 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "abreast replay runs/mine/run.mcap --estimator smoother --out smoothed",
         "abreast replay recording.mcap --map topics.toml --csv estimates.csv",
     ),
+    "compare": (
+        "abreast compare runs/before runs/after",
+        'abreast compare before.mcap after.mcap --fail-if "estimation.rmse.v1 > 1.1" --out compared',
+    ),
+    "export": (
+        "abreast export runs/mine/run.mcap --to tables",
+        "abreast export runs/mine/run.mcap --to tables --format csv --overwrite",
+        "abreast export runs/mine/run.mcap --to scene --format foxglove",
+    ),
+    "live": (
+        "abreast live my_lab.toml --connect tcp/192.0.2.10:7447",
+        "abreast live --live-port 7480",
+    ),
     "simulate": (
         "abreast simulate fig2-independent --out fig2",
         "abreast simulate turtlebot3 --stability",
@@ -97,6 +110,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "bridge mocap": (
         "abreast bridge mocap my_lab.toml --type vicon --server 192.0.2.5",
         "abreast bridge mocap my_lab.toml --type qualisys --server 192.0.2.5 --up z",
+    ),
+    "bridge foxglove": (
+        "abreast bridge foxglove my_lab.toml",
+        "abreast bridge foxglove my_lab.toml --connect tcp/192.0.2.10:7447",
     ),
     "bridge ros2": (
         "abreast bridge ros2 my_lab.toml",

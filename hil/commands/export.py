@@ -11,7 +11,7 @@ import click
 from formation.collector import collector_paused
 from hil.commands.outputs import OutputFolder
 from hil.errors import CheckFailedError, UsageError
-from hil.log.report_json import print_json, print_text, results_apart
+from hil.log.report_json import note, print_json, print_text, results_apart
 
 if TYPE_CHECKING:
     from hil.exports.table_export import TableExport
@@ -106,7 +106,7 @@ def _write_tables(
     if not overwrite:
         refuse_present(folder)
     if form is None and not has_parquet():
-        click.echo("pyarrow is not there, so tables are written as CSV", err=True)
+        note("pyarrow is not there, so tables are written as CSV")
     chosen: Format = "csv" if form == "csv" or (form is None and not has_parquet()) else "parquet"
     done = export_tables(log, folder, chosen, choice)
     _tell(done, as_json=as_json)
@@ -121,12 +121,12 @@ def _refuse_damage(log: Log, damage: str) -> None:
 
 def _tell_left_out(left_out: Mapping[str, str]) -> None:
     for topic, why in left_out.items():
-        click.echo(f"topic {topic}: left out: {why}", err=True)
+        note(f"topic {topic}: left out: {why}")
 
 
 def _tell(done: TableExport, *, as_json: bool) -> None:
     for topic, count in done.topics.malformed.items():
-        click.echo(f"topic {topic}: {count} payloads are no message of its type, and left out", err=True)
+        note(f"topic {topic}: {count} payloads are no message of its type, and left out")
     _tell_left_out(done.topics.left_out)
     if done.older:
         click.echo(f"still there from an export before: {', '.join(done.older)}", err=True)

@@ -10,6 +10,7 @@ import click
 
 from hil.commands.page_options import page_options
 from hil.commands.wire_options import endpoints_of, wire_options
+from hil.log.report_json import note
 
 
 @click.command("live", params=[*page_options(), *wire_options(listens=False)])
@@ -78,4 +79,4 @@ def command(
 
 
 def _say(line: str) -> None:
-    click.echo(f"abreast live: {line}", err=True)
+    note(f"abreast live: {line}")

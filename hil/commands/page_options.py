@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from hil.commands.whole_numbers import Whole
 from hil.errors import UsageError
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ class PagePlace(NamedTuple):
 
 def page_options() -> list[click.Parameter]:
     """``--live-port`` and ``--live-address``."""
-    port = click.IntRange(1, 65535)
+    port = Whole(1, 65535)
     return [
         click.Option(["--live-port"], type=port, metavar="N", help="Port of the page [7480, or a free one]."),
         click.Option(

@@ -14,6 +14,7 @@ from hil.commands.outputs import OutputFile, OutputFolder
 from hil.commands.progress import READY, doing, progress
 from hil.commands.replay_folder import refuse_for_folder, replay_folder
 from hil.commands.seconds import Seconds
+from hil.commands.whole_numbers import Whole
 from hil.errors import CheckFailedError, InterruptedRunError, UsageError
 from hil.extras import begin_to_judge
 from hil.live.interrupts import Interrupt
@@ -51,7 +52,7 @@ if TYPE_CHECKING:
 @click.option("--certify", is_flag=True, help="Judge a guaranteed error radius of every estimate too.")
 @click.option(
     "--workers",
-    type=click.IntRange(min=1),
+    type=Whole(1),
     metavar="N",
     help="Processes for a folder of logs [all].",
 )

@@ -66,8 +66,8 @@ def test_the_examples_of_a_command_parse_and_stand_in_its_help(
     assert len(EXAMPLES[words]) in (2, 3)
     for example in EXAMPLES[words]:
         assert example in text
-        line = example.removeprefix('eval "$(').removesuffix(')"').partition(" > ")[0]
-        given = shlex.split(line)
+        line = example.removeprefix('eval "$(').removesuffix(')"')
+        given = shlex.split(re.sub(r" > \S+$", "", line))
         assert given[: 1 + len(words.split())] == ["abreast", *words.split()]
         LEAVES[words].make_context(words, given[1 + len(words.split()) :])
 
