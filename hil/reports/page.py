@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from html import escape
 
 from hil.reports.colours import reference
-from hil.reports.page_script import THEME, TIME, drawing
+from hil.reports.page_script import THEME, TIME, TOOLS, drawing
 from hil.reports.page_style import STYLE
 from hil.reports.plot_models import Figure, bokeh_script, document_of
 from hil.reports.plots import Key, Panel
@@ -91,15 +91,17 @@ def page(
     body = "\n".join(_section(section, place_of) for section in filled)
     plots = _plots({place: panel.plot for place, panel in places.items()}) if places else ""
     moved = timeline is not None and bool(places)
+    zooms = any(_has_zoom(panel.plot) for panel in places.values())
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         f'<link rel="icon" href="data:,">\n<style>{STYLE}</style>\n</head>\n'
         f"<body>\n{_top(filled)}\n<header>\n{head}\n</header>\n<main>\n{body}\n</main>\n"
-        + (_bar(timeline) if timeline is not None and moved else "")
+        + (_bar(timeline) if moved or zooms else "")
         + f"<script>{THEME}</script>\n{plots}"
         + (f"<script>{TIME}</script>\n" if moved else "")
+        + (f"<script>{TOOLS}</script>\n" if moved or zooms else "")
         + (f"<script>{script}</script>\n" if script else "")
         + "</body>\n</html>\n"
     )
@@ -147,26 +149,36 @@ def _section(section: Section, place_of: Mapping[int, str]) -> str:
     return f'<section id="{section.place}">\n{heading}\n{section.html}\n{grid}\n{section.below}\n</section>'
 
 
-def _bar(timeline: Timeline) -> str:
+def _bar(timeline: Timeline | None) -> str:
     """The time slider, what there was at that time, and what a drag in a plot does."""
-    readout = " · ".join(
-        f'{escape(symbol)} <span data-course="{name}" data-digits="{digits}">–</span> {escape(unit)}'
-        for symbol, unit, digits, name in timeline.readout
-    )
     tools = "".join(
         f'<button id="{name}" aria-pressed="false" title="{escape(says)}">{escape(label)}</button>'
         for name, label, says in _TOOLS
     )
     return (
-        '<div class="bar" id="bar" role="group" aria-label="Time and tools of all plots" hidden>'
+        '<div class="bar" id="bar" role="group" aria-label="Tools of all plots" hidden>'
+        + ("" if timeline is None else _slider(timeline))
+        + '<button id="more" aria-expanded="false" aria-label="Zoom and move plots">⤢</button>'
+        f'<div class="tools">{tools}<button id="whole">Whole run</button></div></div>\n'
+    )
+
+
+def _slider(timeline: Timeline) -> str:
+    readout = " · ".join(
+        f'{escape(symbol)} <span data-course="{name}" data-digits="{digits}">–</span> {escape(unit)}'
+        for symbol, unit, digits, name in timeline.readout
+    )
+    return (
         '<button id="play" aria-label="Play">▶</button>'
         f'<input type="range" id="time" aria-label="Time" min="{timeline.first:.6g}" '
         f'max="{timeline.last:.6g}" step="any" value="{timeline.last:.6g}">'
         f'<output id="shown" for="time">{timeline.last:.2f} s</output>'
         + (f'<span class="readout">{readout}</span>' if readout else "")
-        + '<button id="more" aria-expanded="false" aria-label="Zoom and move plots">⤢</button>'
-        f'<div class="tools">{tools}<button id="whole">Whole run</button></div></div>\n'
     )
+
+
+def _has_zoom(plot: Figure) -> bool:
+    return any(tool.kind == "BoxZoomTool" for tool in plot.attributes["toolbar"].attributes["tools"])
 
 
 def _figure(panel: Panel, place: str) -> str:

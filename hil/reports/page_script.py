@@ -142,6 +142,13 @@ drawn.then(() => {
     before = performance.now(); playing = requestAnimationFrame(step);
   });
   slider.addEventListener("input", () => { stop(); show(+slider.value); });
+  show(+slider.value);
+});
+"""
+
+
+TOOLS = """
+drawn.then(() => {
   const drags = {zoom: ["BoxZoomTool"], move: ["PanTool"], wheel: ["WheelZoomTool"]};
   const choose = name => {
     for (const [each, kinds] of Object.entries(drags)) {
@@ -161,7 +168,6 @@ drawn.then(() => {
   });
   if (matchMedia("(pointer: fine)").matches) choose("zoom"); // a finger that drags scrolls the page
   document.getElementById("bar").hidden = false;
-  show(+slider.value);
 });
 """
 
