@@ -16,6 +16,7 @@ from hil.reports.judged_log import leave, made_folder, results_in
 if TYPE_CHECKING:
     from hil.judge.replayed import ReplayChoice
 
+_MOST_NAMED = 10
 _REPORTS = 3
 """So many of the worst get a report of their own: one takes a few seconds."""
 
@@ -96,7 +97,8 @@ def _lines(result: dict[str, Any], verdict: str) -> list[str]:
     lines = [verdict]
     broken = [f"  {row['log']}: {row['error']}" for row in result["logs"] if "error" in row]
     if broken:
-        lines += ["could not be judged:", *broken]
+        lines += ["could not be judged:", *broken[:_MOST_NAMED]]
+        lines += [f"  and {len(broken) - _MOST_NAMED} more"] * (len(broken) > _MOST_NAMED)
     if result["worst"]:
         lines += ["worst:", *(f"  {each['log']}: {each['why']}" for each in result["worst"])]
     return lines

@@ -55,7 +55,8 @@ def ratio_maps(first: Group, other: Group) -> list[Panel]:
             data |= {name: data[f"{name}|{quantities[0]}|0"] for name in LOOKS}
             title = f"{other.label}: {estimator}{' (foil)' * (estimator in foils)}"
             says = f"RMSE over that of {first.label}; below 1 is better."
-            panels.append(noise_map(title, says, data, list(rows.values()), list(columns.values())))
+            across, up = list(columns.values()), list(rows.values())
+            panels.append(noise_map(title, says, data, up, across, leads=False))
     return panels
 
 

@@ -31,7 +31,7 @@ class Look:
     href: str
 
 
-ABSENT = Look("rgba(0, 0, 0, 0)", _BLACK, "", "not in the sweep", _PLAIN, "#")
+ABSENT = Look("rgba(0, 0, 0, 0)", _BLACK, "", "not in the sweep", _PLAIN, "#over-noise")
 
 
 def coloured(share: float, text: str, tip: str, href: str) -> Look:

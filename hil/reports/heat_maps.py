@@ -12,7 +12,7 @@ import numpy as np
 from hil.reports.cell_looks import ABSENT, LOOKS, Look, coloured, unjudged
 from hil.reports.cell_table import address_of
 from hil.reports.plot_models import Field, Model, Value, source_of
-from hil.reports.plots import Panel, blank, hover
+from hil.reports.plots import Panel, blank, hover, lead_on
 from hil.reports.run_tables import QUANTITIES, scale_of
 from hil.reports.sweep_cells import Cell, estimators_of, is_sound, number
 
@@ -159,9 +159,18 @@ def noise_labels(cells: Sequence[Cell], axis: str) -> dict[float, str]:
 
 
 def noise_map(
-    title: str, says: str, data: Mapping[str, list[str]], rows: Sequence[str], columns: Sequence[str]
+    title: str,
+    says: str,
+    data: Mapping[str, list[str]],
+    rows: Sequence[str],
+    columns: Sequence[str],
+    *,
+    leads: bool = True,
 ) -> Panel:
-    """A map of :class:`~hil.reports.cell_looks.Look` as columns of ``data``; a cell leads to its ``href``."""
+    """A map of :class:`~hil.reports.cell_looks.Look` as columns of ``data``.
+
+    ``leads``: whether a tap on a cell leads to its ``href``.
+    """
     plot = blank(
         height=_HEIGHT_OF_REST + max(_HEIGHT_OF_ROW * len(rows), _HEIGHT_OF_LABEL),
         x_label="heading noise [deg]",
@@ -187,11 +196,11 @@ def noise_map(
     )
     drawn = plot.add_glyph(source, area)
     hover(plot, drawn, {title: "@tip"}, mode="mouse")
-    there = Model("OpenURL", url="@href", same_tab=True)
-    plot.add_tools(Model("TapTool", renderers=[drawn], behavior="inspect", callback=there))
     centred = {"text_align": Value("center"), "text_baseline": Value("middle")}
     font = {"text_color": Field("ink"), "text_font_size": Value("12px"), "text_font_style": Value("bold")}
-    plot.add_glyph(source, Model("Text", **place, text=Field("text"), **centred, **font))
+    letters = plot.add_glyph(source, Model("Text", **place, text=Field("text"), **centred, **font))
+    if leads:
+        lead_on(plot, drawn, letters)
     return Panel(title, says, (), plot)
 
 

@@ -14,7 +14,7 @@ from hil.judge.dotted_figures import HEADLINES, bare, figures_of
 from hil.reports.colours import BLUE
 from hil.reports.page import Section, page
 from hil.reports.plot_models import Field, Model, Value, source_of
-from hil.reports.plots import Panel, blank, hover
+from hil.reports.plots import Panel, blank, hover, lead_on
 from hil.reports.run_tables import QUANTITIES, scale_of
 from hil.reports.scroll_frame import FRAME_STYLE, framed_rows
 
@@ -150,8 +150,7 @@ def _panels(rows: Sequence[Mapping[str, Any]]) -> list[Panel]:
         dots = Model("Scatter", x=Field("x"), y=Field("y"), line_color=Value(BLUE), **look)
         drawn = plot.add_glyph(source, dots)
         hover(plot, drawn, {"@log": f"@y{{0.000}} {unit}"}, mode="mouse")
-        there = Model("OpenURL", url="@href", same_tab=True)
-        plot.add_tools(Model("TapTool", renderers=[drawn], behavior="inspect", callback=there))
+        lead_on(plot, drawn)
         panels.append(Panel(title, "A point is a log; a tap leads to its row.", (), plot))
     return panels
 

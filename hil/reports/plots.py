@@ -180,6 +180,14 @@ def hover(
     plot.add_tools(Model("HoverTool", renderers=[over], mode=mode, tooltips=list(tips.items())))
 
 
+def lead_on(plot: Figure, *drawn: Model) -> None:
+    """Have a tap on a point lead to the address in its column ``href``, and leave all as it is drawn."""
+    for renderer in drawn:
+        renderer.set(selection_glyph=None, nonselection_glyph=None)
+    there = Model("OpenURL", url="@href", same_tab=True)
+    plot.add_tools(Model("TapTool", renderers=[drawn[0]], callback=there))
+
+
 def limits_around(
     *values: FloatArray, floor: float = -math.inf, ceiling: float = math.inf
 ) -> tuple[float, float]:

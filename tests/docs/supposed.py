@@ -42,6 +42,9 @@ def record(folder: Path) -> None:
     driven = abreast.run_lockstep(abreast.load_scenario("turtlebot3", given), log=bag / "my_bag_0.mcap")
     shutil.copy(bag / "my_bag_0.mcap", folder / "run.mcap")
     shutil.copy(bag / "my_bag_0.mcap", folder / "drive.mcap")
+    for place in ("before/1", "before/2", "after/1", "after/2", "logs/1", "logs/2"):
+        (folder / place).parent.mkdir(exist_ok=True)
+        shutil.copy(bag / "my_bag_0.mcap", folder / f"{place}.mcap")
     truth = driven.truth
     known = np.isfinite(truth.rho) & np.isfinite(truth.v1)
     t = truth.t[known] - truth.t[known][0]

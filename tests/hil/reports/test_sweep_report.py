@@ -10,12 +10,13 @@ from typing import Any
 import pytest
 from bokeh.palettes import Cividis256
 from selenium.webdriver import Chrome
+from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
-from selenium.webdriver.support.ui import Select
+from selenium.webdriver.support.ui import Select, WebDriverWait
 
 from hil.reports.heat_maps import MERITS, Merit, heat_maps
 from hil.reports.sweep_report import sweep_report
-from tests.hil.reports.open_page import open_page
+from tests.hil.reports.open_page import PATIENCE, open_page
 
 POSITIONS, HEADINGS = (0.0001, 0.001, 0.005), (0.002, 0.035)
 LATENCIES, LOSSES = (0.0, 0.03, 0.2), (0.0, 0.2)
@@ -204,3 +205,27 @@ def test_cells_whose_deviations_are_not_what_errors_are_are_counted(results: dic
 
 def test_an_empty_sweep_is_a_page_too() -> None:
     assert "0 cells" in words(sweep_report({"cells": [], "run_seconds": 0.0, "wall_s": 0.1}))
+
+
+@pytest.mark.slow
+def test_a_tap_on_a_cell_opens_its_row_or_its_kept_run(
+    browser: Chrome, results: dict[str, Any], tmp_path: Path
+) -> None:
+    kept = tmp_path / "cell-0-run-3"
+    kept.mkdir()
+    (kept / "report.html").write_text("<title>kept</title>", encoding="utf-8")
+    results["cells"][0]["kept"] = {"3": kept.name}
+    path = tmp_path / "report.html"
+    path.write_text(sweep_report(results), encoding="utf-8")
+    open_page(browser, path, 1280)
+    plot = browser.find_element(By.ID, "plot0")
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", plot)
+    # Right of the middle lies a cell of the second heading noise, in the middle row of three.
+    ActionChains(browser).move_to_element_with_offset(plot, plot.size["width"] // 4, -20).click().perform()
+    WebDriverWait(browser, PATIENCE).until(lambda b: "#cell-" in b.current_url)
+    row = browser.find_element(By.CSS_SELECTOR, ":target")
+    assert row.is_displayed(), "the folded table is open"
+    # Left of the middle, far down: the least noise of both.
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", plot)
+    ActionChains(browser).move_to_element_with_offset(plot, -plot.size["width"] // 8, 15).click().perform()
+    WebDriverWait(browser, PATIENCE).until(lambda b: b.title == "kept")
