@@ -35,8 +35,8 @@ ERRORS = ROOT / "hil" / "errors.py"
 GROUPS = {"abreast.laws", "abreast.estimators"}
 """Entry points, by which packages of others give names to laws and estimators."""
 
-OTHERS = {"enable_stamped_cmd_vel", "rmw_zenoh_cpp", "rmw_zenohd"}
-"""Names of other people's programs and parameters."""
+OTHERS = {"SceneUpdate", "enable_stamped_cmd_vel", "rmw_zenoh_cpp", "rmw_zenohd"}
+"""Names of other people's programs, messages and parameters."""
 
 JOINED = {"mount.leader_x_mm"}
 """Names that code puts together."""
