@@ -11,6 +11,7 @@ import click
 from formation.collector import collector_paused
 from hil.commands.outputs import OutputFolder
 from hil.errors import CheckFailedError, UsageError
+from hil.extras import begin_to_judge
 from hil.log.report_json import note, print_json, print_text, results_apart
 
 if TYPE_CHECKING:
@@ -75,6 +76,7 @@ def command(
         overrides=overrides,
         in_messages=True,
     )
+    begin_to_judge("export")
     write = _write_foxglove if form == "foxglove" else _write_tables
     write(opened_log(log), folder, form, choice, overwrite=overwrite, as_json=as_json)
 
@@ -106,7 +108,7 @@ def _write_tables(
     if not overwrite:
         refuse_present(folder)
     if form is None and not has_parquet():
-        note("pyarrow is not there, so tables are written as CSV")
+        note("tables are written as CSV; for Parquet: pip install 'abreast[tables]'")
     chosen: Format = "csv" if form == "csv" or (form is None and not has_parquet()) else "parquet"
     done = export_tables(log, folder, chosen, choice)
     _tell(done, as_json=as_json)

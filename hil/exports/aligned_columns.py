@@ -10,31 +10,6 @@ SHAPE = ("rho", "alpha2", *QUANTITIES)
 """Shape of the pair, its rates and the leader's motion: what is estimated."""
 
 TRUE_POSES = ("leader_x", "leader_y", "leader_theta", "follower_x", "follower_y", "follower_theta")
-_POSE_UNITS = {"x": "m", "y": "m", "theta": "rad"}
-_POSE_WORDS = {"x": "x", "y": "y", "theta": "heading"}
-_OWN = {"v2": ("m/s", "speed"), "u2": ("rad/s", "turn rate")}
-
-
-def _errors() -> tuple[TableColumn, ...]:
-    return tuple(
-        TableColumn(f"error_{name}", ESTIMATE_COLUMNS[name].unit, f"{name} minus true_{name}, angles wrapped")
-        for name in SHAPE
-    )
-
-
-def _truth() -> tuple[TableColumn, ...]:
-    shapes = (TableColumn(f"true_{name}", ESTIMATE_COLUMNS[name].unit, f"true {name} at t") for name in SHAPE)
-    motions = (
-        TableColumn(f"true_{name}", unit, f"true {word} of the follower at t")
-        for name, (unit, word) in _OWN.items()
-    )
-    poses = (
-        TableColumn(f"true_{name}", _POSE_UNITS[axis], f"true {_POSE_WORDS[axis]} of the {robot} at t")
-        for name in TRUE_POSES
-        for robot, axis in [name.split("_")]
-    )
-    return (*shapes, *motions, *poses)
-
 
 ALIGNED_COLUMNS = (
     TableColumn("follower", "", "name of the follower whose estimate it is"),
@@ -54,8 +29,28 @@ ALIGNED_COLUMNS = (
     TableColumn("nis", "", "normalised innovation squared of the newest measurement"),
     ESTIMATE_COLUMNS["status"],
     TableColumn("reason", "", "why the status is not tracking"),
-    *_truth(),
-    *_errors(),
+    TableColumn("true_rho", "m", "true rho at t"),
+    TableColumn("true_alpha2", "rad", "true alpha2 at t"),
+    TableColumn("true_rho_dot", "m/s", "true rho_dot at t"),
+    TableColumn("true_alpha2_dot", "rad/s", "true alpha2_dot at t"),
+    TableColumn("true_v1", "m/s", "true v1 at t"),
+    TableColumn("true_alpha1", "rad", "true alpha1 at t"),
+    TableColumn("true_u1", "rad/s", "true u1 at t"),
+    TableColumn("true_v2", "m/s", "true speed of the follower at t"),
+    TableColumn("true_u2", "rad/s", "true turn rate of the follower at t"),
+    TableColumn("true_leader_x", "m", "true x of the leader at t"),
+    TableColumn("true_leader_y", "m", "true y of the leader at t"),
+    TableColumn("true_leader_theta", "rad", "true heading of the leader at t"),
+    TableColumn("true_follower_x", "m", "true x of the follower at t"),
+    TableColumn("true_follower_y", "m", "true y of the follower at t"),
+    TableColumn("true_follower_theta", "rad", "true heading of the follower at t"),
+    TableColumn("error_rho", "m", "rho minus true_rho"),
+    TableColumn("error_alpha2", "rad", "alpha2 minus true_alpha2, wrapped"),
+    TableColumn("error_rho_dot", "m/s", "rho_dot minus true_rho_dot"),
+    TableColumn("error_alpha2_dot", "rad/s", "alpha2_dot minus true_alpha2_dot"),
+    TableColumn("error_v1", "m/s", "v1 minus true_v1"),
+    TableColumn("error_alpha1", "rad", "alpha1 minus true_alpha1, wrapped"),
+    TableColumn("error_u1", "rad/s", "u1 minus true_u1"),
     TableColumn("command_v2", "m/s", "speed in force at t: of the last command issued by then"),
     TableColumn("command_u2", "rad/s", "turn rate in force at t"),
     TableColumn("command_v2_wanted", "m/s", "what the law wanted, before limits and stops"),

@@ -13,6 +13,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from hil.errors import UsageError
+from hil.extras import needs_extra
 from hil.log.cdr_columns import Lists, Values
 from hil.log.table_column import TableColumn
 from hil.log.written_aside import written_aside
@@ -97,8 +98,8 @@ class _ParquetTable:
         try:
             import pyarrow
             from pyarrow import parquet
-        except ImportError:
-            raise UsageError("Parquet needs pyarrow; pip install pyarrow, or give --format csv") from None
+        except ModuleNotFoundError as error:
+            raise needs_extra("export to Parquet", error) from None
         self._pa, self._parquet = pyarrow, parquet
         self._path, self._columns = path, columns
         self._writer: Any = None

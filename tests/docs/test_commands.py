@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from abreast import export, load_scenario, run_lockstep
 from hil.command_line import COMMANDS, abreast
 from hil.wire.session import reserved_endpoint
 from tests.docs.pages import MADE, PAGES, Block, blocks, code_in, command_of, options_of, prose, words_of
@@ -185,6 +186,18 @@ def ended(words: list[str], folder: Path, where: str) -> None:
 PYTHON = [block for block in ALL if is_python(block) and block.page not in PAGES_RUN]
 
 
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the tables that pages read."""
+    folder = tmp_path_factory.mktemp("exported")
+    scenario = load_scenario("turtlebot3", ["run.duration_s=3.0"])
+    run_lockstep(scenario, log=folder / "run.mcap")
+    export(folder / "run.mcap", folder / "tables")
+    return folder
+
+
 @pytest.mark.parametrize("block", PYTHON, ids=[f"{block.page.name}:{block.line}" for block in PYTHON])
-def test_the_python_of_a_page_runs(block: Block) -> None:
+def test_the_python_of_a_page_runs(block: Block, exported: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(exported)
+    monkeypatch.setenv("MPLBACKEND", "agg")
     exec(compile(block.text, f"{block.page}:{block.line}", "exec"), {})

@@ -48,7 +48,7 @@ def test_without_pyarrow_tables_are_csv(
     monkeypatch.setattr(table_file, "has_parquet", lambda: False)
     code, out, err = said(capsys, short_log.path, "--to", tmp_path / "out")
     assert code == 0
-    assert "pyarrow" in err
+    assert "abreast[tables]" in err
     assert (tmp_path / "out/aligned.csv").is_file()
     assert "aligned.csv" in out
 

@@ -3,12 +3,8 @@ from __future__ import annotations
 import csv
 import dataclasses
 import math
-import re
 from pathlib import Path
-from typing import Any
 
-import matplotlib
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import polars as pl
@@ -108,20 +104,6 @@ def test_the_docs_have_the_columns_of_the_code() -> None:
     rows = [line.strip("|").split("|") for line in text.splitlines() if line.startswith("| `")]
     told = [tuple(cell.strip().strip("`") for cell in row) for row in rows]
     assert told == [tuple(column) for column in ALIGNED_COLUMNS]
-
-
-def test_the_lines_of_the_docs_read_them(
-    short_log: Log, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    text = (Path(__file__).parents[3] / "docs/export.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"^```python$(.*?)^```$", text, re.MULTILINE | re.DOTALL)
-    export_tables(short_log, tmp_path / "tables", "parquet", RECORDED)
-    monkeypatch.chdir(tmp_path)
-    matplotlib.use("Agg")
-    names: dict[str, Any] = {}
-    exec(block, names)
-    plt.close("all")
-    assert {"run", "odometry", "bodies"} <= names.keys()
 
 
 def test_csv_holds_the_same_and_says_what_columns_are(folder: Path, short_log: Log, tmp_path: Path) -> None:
