@@ -13,7 +13,6 @@ from pathlib import Path
 
 import pytest
 
-from abreast import export, load_scenario, run_lockstep
 from hil.command_line import COMMANDS, abreast
 from hil.wire.session import reserved_endpoint
 from tests.docs.pages import MADE, PAGES, Block, blocks, code_in, command_of, options_of, prose, words_of
@@ -79,6 +78,10 @@ def is_python(block: Block) -> bool:
     return block.language == "python" and not block.file
 
 
+def is_run(block: Block) -> bool:
+    return runnable(block) or is_python(block)
+
+
 def finite(line: str, router: str) -> str:
     """A line of a page that ends soon; in a lab on loopback, where there is a ``router``, that one's."""
     context, left = command_of(abreast, words_of(line))
@@ -137,7 +140,7 @@ def lab(folder: Path) -> Iterator[Lab]:
                 process.communicate()
 
 
-PAGES_RUN = [page for page in PAGES if any(runnable(block) for block in ALL if block.page == page)]
+PAGES_RUN = [page for page in PAGES if any(is_run(block) for block in ALL if block.page == page)]
 
 
 @pytest.mark.slow
@@ -149,7 +152,7 @@ def test_the_commands_of_a_page_run_in_their_order(page: Path, tmp_path: Path) -
         if block.file:
             (tmp_path / block.file).write_text(block.text, encoding="utf-8")
     with lab(tmp_path) as started:
-        for block in [each for each in blocks(page) if runnable(each) or is_python(each)]:
+        for block in filter(is_run, blocks(page)):
             if block.marker == "end of daemons":
                 started.end()
             if is_python(block):
@@ -181,23 +184,3 @@ def ended(words: list[str], folder: Path, where: str) -> None:
         check=False,
     )
     assert done.returncode == 0, f"{where}\n{done.stdout}\n{done.stderr}"
-
-
-PYTHON = [block for block in ALL if is_python(block) and block.page not in PAGES_RUN]
-
-
-@pytest.fixture(scope="module")
-def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the tables that pages read."""
-    folder = tmp_path_factory.mktemp("exported")
-    scenario = load_scenario("turtlebot3", ["run.duration_s=3.0"])
-    run_lockstep(scenario, log=folder / "run.mcap")
-    export(folder / "run.mcap", folder / "tables")
-    return folder
-
-
-@pytest.mark.parametrize("block", PYTHON, ids=[f"{block.page.name}:{block.line}" for block in PYTHON])
-def test_the_python_of_a_page_runs(block: Block, exported: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(exported)
-    monkeypatch.setenv("MPLBACKEND", "agg")
-    exec(compile(block.text, f"{block.page}:{block.line}", "exec"), {})
