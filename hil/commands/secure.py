@@ -44,6 +44,7 @@ def init(
 
     A machine needs ca.pem and the files of the roles that it has. Whoever has the key of a role has the role.
     """
+    from hil.log.origin import LOCAL_TIME
     from hil.scenario.files import load_scenario
     from hil.scenario.guarded import with_guards
     from hil.wire.roles import ROLES
@@ -56,5 +57,5 @@ def init(
     now = datetime.datetime.now(datetime.UTC)
     wanted = Deployment(chosen, hosts, days)
     make_keys(folder, wanted, now=now, replacing=force)
-    until = now + datetime.timedelta(days=days)
-    say(f"{folder}: keys of {', '.join(ROLES)} for {chosen.name}, valid until {until:%Y-%m-%d}")
+    until = (now + datetime.timedelta(days=days)).astimezone().strftime(LOCAL_TIME)
+    say(f"{folder}: keys of {', '.join(ROLES)} for {chosen.name}, valid until {until}")

@@ -37,11 +37,15 @@ class Origin:
     scenario_toml: str = ""
 
 
+LOCAL_TIME = "%Y-%m-%d %H:%M:%S %z (%Z)"
+"""How a person reads when something was: in the time of his place, with its zone."""
+
+
 def made_here() -> dict[str, dict[str, str]]:
     """Metadata record of a log that is begun now, on this host."""
     return {
         MADE: {
-            "begun": time.strftime("%Y-%m-%d %H:%M:%S %z (%Z)"),
+            "begun": time.strftime(LOCAL_TIME),
             "host": platform.node(),
             "system": platform.platform(),
             "python": platform.python_version(),
@@ -56,7 +60,7 @@ def origin_of(log: Log) -> Origin:
     made: Mapping[str, str] = log.metadata.get(MADE, {})
     begun = made.get("begun", "")
     if not begun and record.get("mode") == LIVE and log.start_ns is not None:
-        begun = time.strftime("%Y-%m-%d %H:%M:%S +0000 (UTC)", time.gmtime(log.start_ns // 1_000_000_000))
+        begun = time.strftime(LOCAL_TIME, time.localtime(log.start_ns // 1_000_000_000))
     return Origin(
         begun=begun,
         **{name: record.get(name, "") for name in ("version", "mode", "seed", "scenario_toml")},

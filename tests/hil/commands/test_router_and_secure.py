@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import stat
 import subprocess
@@ -63,15 +64,18 @@ def test_a_config_file_must_say_where_a_router_listens(tmp_path: Path) -> None:
     assert both.returncode == 2
 
 
-def test_keys_are_made_used_and_told_apart(tmp_path: Path) -> None:
+def test_keys_are_made_used_and_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     keys = tmp_path / "keys"
     # A generous umask must not show anything.
     before = os.umask(0)
     try:
+        monkeypatch.setenv("TZ", "Asia/Tokyo")
         made = abreast("secure", "init", str(keys), "--host", "192.0.2.10", "--days", "3")
     finally:
         os.umask(before)
     assert made.returncode == 0, made.stderr
+    # When they end is told in the time of the place, with its zone.
+    assert re.search(r"valid until 2\d{3}-\d\d-\d\d \d\d:\d\d:\d\d \+0900 \(JST\)", made.stdout)
     assert "PRIVATE" not in made.stdout + made.stderr
     assert not any(stat.S_IMODE(each.stat().st_mode) & 0o077 for each in (keys, *keys.iterdir()))
     again = abreast("secure", "init", str(keys))
