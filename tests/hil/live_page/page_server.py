@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 from tornado.httpclient import HTTPRequest
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
-PATIENCE = 60.0
+PATIENCE = 180.0
 HUNG_UP = 0
 
 
