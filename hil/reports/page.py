@@ -169,7 +169,7 @@ def _slider(timeline: Timeline) -> str:
         for symbol, unit, digits, name in timeline.readout
     )
     return (
-        '<button id="play" aria-label="Play">▶</button>'
+        '<button id="play" aria-label="Play">▶&#xfe0e;</button>'
         f'<input type="range" id="time" aria-label="Time" min="{timeline.first:.6g}" '
         f'max="{timeline.last:.6g}" step="any" value="{timeline.last:.6g}">'
         f'<output id="shown" for="time">{timeline.last:.2f} s</output>'

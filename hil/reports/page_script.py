@@ -126,7 +126,7 @@ drawn.then(() => {
     }
   };
   let playing = 0, before = 0;
-  const stop = () => { cancelAnimationFrame(playing); playing = 0; play.textContent = "\\u25b6";
+  const stop = () => { cancelAnimationFrame(playing); playing = 0; play.textContent = "\\u25b6\\ufe0e";
     play.setAttribute("aria-label", "Play"); };
   const step = stamp => {
     const speed = Math.max(1, (last - first) / 30);
@@ -138,7 +138,7 @@ drawn.then(() => {
   play.addEventListener("click", () => {
     if (playing) { stop(); return; }
     if (+slider.value >= last) slider.value = first;
-    play.textContent = "\\u23f8"; play.setAttribute("aria-label", "Pause");
+    play.textContent = "\\u275a\\u275a"; play.setAttribute("aria-label", "Pause");
     before = performance.now(); playing = requestAnimationFrame(step);
   });
   slider.addEventListener("input", () => { stop(); show(+slider.value); });
