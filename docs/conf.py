@@ -45,17 +45,6 @@ html_show_sphinx = False
 html_show_copyright = False
 
 
-def skip_unwritten(app: Sphinx, page: str, source: list[str]) -> None:
-    """Leave out of the navigation what has a place there and is not written yet: a line ``name*``."""
-    if page == root_doc:
-        here = Path(app.srcdir) / "docs"
-        source[0] = "".join(
-            line
-            for line in source[0].splitlines(keepends=True)
-            if not line.rstrip().endswith("*") or any(here.glob(f"{line.strip()}.md"))
-        )
-
-
 def lead_to_the_pages(app: Sphinx, failure: Exception | None) -> None:
     """Write the front door of the site, as its pages lie one folder below."""
     if failure is None and app.builder.format == "html":
@@ -69,5 +58,4 @@ def lead_to_the_pages(app: Sphinx, failure: Exception | None) -> None:
 
 def setup(app: Sphinx) -> None:
     """Join in with Sphinx."""
-    app.connect("source-read", skip_unwritten)
     app.connect("build-finished", lead_to_the_pages)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 import abreast
+from hil.log.opened import opened_log
+from hil.replay.proposed_map import proposed_map
 from tests.docs.pages import ROOT, blocks
 from tests.recording_layouts import Array, Motive, Tracks, motive_text, tum_text
 
@@ -57,6 +60,18 @@ def record(folder: Path) -> None:
         (folder / f"{name}.txt").write_bytes(tum_text(t_ns, poses, comments=True))
     _tables(folder, t, leader, follower, pair.motion)
     _data_set(folder / "MRCLAM_Dataset9", t, leader, follower, pair.motion)
+    _earlier_runs(folder, given)
+
+
+def _earlier_runs(folder: Path, given: Mapping[str, float]) -> None:
+    """Runs of before: a pair, a chain, and a map of the bag's topics."""
+    shutil.copytree(folder / "my_bag", folder / "runs" / "mine")
+    (folder / "runs" / "mine" / "my_bag_0.mcap").rename(folder / "runs" / "mine" / "run.mcap")
+    (folder / "runs" / "chain").mkdir()
+    chain = abreast.load_scenario("chain5-turtlebot3", given)
+    abreast.run_lockstep(chain, log=folder / "runs" / "chain" / "run.mcap")
+    proposed = proposed_map(opened_log(folder / "my_bag"))
+    (folder / "topics.toml").write_text(proposed, encoding="utf-8")
 
 
 def _posed(planar: Array) -> Array:

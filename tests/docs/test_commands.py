@@ -19,8 +19,11 @@ from tests.docs.pages import MADE, PAGES, Block, blocks, code_in, command_of, op
 from tests.docs.supposed import lay_out, record
 
 ROUTER = "tcp/127.0.0.1:7447"
-LAB = re.compile(r"(tcp|tls|tcp:/)/192\.0\.2\.|--server 192|--real|--drive")
+LAB = re.compile(r"(tcp|tls|tcp:/)/(192\.0\.2|0\.0\.0\.0)|--server 192|--real|--drive")
 """What needs a lab: robots, machines and cameras that are not here."""
+
+ALONE = {"run", "soak", "faults"}
+"""Of the commands that can join a router those that need none."""
 
 SHORTER = {
     "run": "--duration 6 --set run.evaluate_from_s=3",
@@ -70,16 +73,23 @@ def test_every_command_stands_in_the_docs() -> None:
         assert re.search(rf"abreast {name}\b|`{name}`", text), name
 
 
+def joins(line: str) -> bool:
+    """Whether a command takes part in a lab that is there."""
+    context, left = command_of(abreast, words_of(line))
+    return "--connect" in options_of(context) and context.info_name not in ALONE and "--write" not in left
+
+
+def runs(block: Block, line: str, *, in_lab: bool) -> bool:
+    """Whether a line is run; ``in_lab``: while daemons of its page are."""
+    return block.marker != "hardware" and not LAB.search(line) and (in_lab or not joins(line))
+
+
 def runnable(block: Block) -> bool:
-    return block.marker != "hardware" and any(not LAB.search(line) for line in block.commands)
+    return is_python(block) or any(runs(block, line, in_lab=False) for line in block.commands)
 
 
 def is_python(block: Block) -> bool:
     return block.language == "python" and not block.file
-
-
-def is_run(block: Block) -> bool:
-    return runnable(block) or is_python(block)
 
 
 def finite(line: str, router: str) -> str:
@@ -140,7 +150,7 @@ def lab(folder: Path) -> Iterator[Lab]:
                 process.communicate()
 
 
-PAGES_RUN = [page for page in PAGES if any(is_run(block) for block in ALL if block.page == page)]
+PAGES_RUN = sorted({block.page for block in ALL if runnable(block)})
 
 
 @pytest.mark.slow
@@ -152,7 +162,7 @@ def test_the_commands_of_a_page_run_in_their_order(page: Path, tmp_path: Path) -
         if block.file:
             (tmp_path / block.file).write_text(block.text, encoding="utf-8")
     with lab(tmp_path) as started:
-        for block in filter(is_run, blocks(page)):
+        for block in blocks(page):
             if block.marker == "end of daemons":
                 started.end()
             if is_python(block):
@@ -160,7 +170,7 @@ def test_the_commands_of_a_page_run_in_their_order(page: Path, tmp_path: Path) -
             for line in block.commands:
                 if block.marker == "daemons":
                     started.begin(line)
-                elif not LAB.search(line):
+                elif runs(block, line, in_lab=bool(started.running)):
                     router = started.router if started.running else ""
                     run(finite(line, router), tmp_path, placed(block, line))
 
