@@ -87,14 +87,15 @@ function changed(open, why) {
 
 const part = (values, k) => values ? values[k] : null;
 const three = sd => sd == null ? null : 3 * sd;
+const DEGREES = 180 / Math.PI;
 const CURVES = [
   { name: "ρ", hue: "ink", unit: "m", plain: true, digits: 3, least: 0.05, get: f => ({ value: part(f.estimate?.shape, 0), wish: f.station[0], orbit: part(f.estimate?.orbit, 0) }) },
-  { name: "α1", hue: "ink", unit: "rad", digits: 2, least: 0.5, wraps: true, get: f => ({ ...believed(f.estimate?.alpha1), wish: f.station[1], orbit: part(f.estimate?.orbit, 1) }) },
-  { name: "α2", hue: "ink", unit: "rad", digits: 2, least: 0.5, wraps: true, get: f => ({ value: part(f.estimate?.shape, 2), wish: f.station[2], orbit: part(f.estimate?.orbit, 2) }) },
+  { name: "α1", hue: "ink", unit: "deg", scale: DEGREES, digits: 1, least: 30, wraps: true, get: f => ({ ...believed(f.estimate?.alpha1), wish: f.station[1], orbit: part(f.estimate?.orbit, 1) }) },
+  { name: "α2", hue: "ink", unit: "deg", scale: DEGREES, digits: 1, least: 30, wraps: true, get: f => ({ value: part(f.estimate?.shape, 2), wish: f.station[2], orbit: part(f.estimate?.orbit, 2) }) },
   { name: "v1", hue: "leader", unit: "m/s", digits: 3, least: 0.1, get: f => believed(f.estimate?.v1), limits: c => [c.leader.k_v] },
-  { name: "u1", hue: "leader", unit: "rad/s", digits: 2, least: 1, get: f => believed(f.estimate?.u1), limits: c => [-c.leader.k_u, c.leader.k_u] },
+  { name: "u1", hue: "leader", unit: "deg/s", scale: DEGREES, digits: 0, least: 60, get: f => believed(f.estimate?.u1), limits: c => [-c.leader.k_u, c.leader.k_u] },
   { name: "v2 sent", hue: "follower", unit: "m/s", digits: 3, least: 0.1, get: f => ({ value: part(f.command?.sent, 0), wish: part(f.command?.wanted, 0) }), limits: c => [-c.limits.v, c.limits.v] },
-  { name: "u2 sent", hue: "follower", unit: "rad/s", digits: 2, least: 1, get: f => ({ value: part(f.command?.sent, 1), wish: part(f.command?.wanted, 1) }), limits: c => [-c.limits.u, c.limits.u] },
+  { name: "u2 sent", hue: "follower", unit: "deg/s", scale: DEGREES, digits: 0, least: 60, get: f => ({ value: part(f.command?.sent, 1), wish: part(f.command?.wanted, 1) }), limits: c => [-c.limits.u, c.limits.u] },
   { name: "age of what a command rests on", hue: "follower", unit: "s", plain: true, digits: 3, least: 0.1, get: f => ({ value: f.command?.measurement_age ?? null }), limits: c => [c.limits.age] },
 ];
 
@@ -102,10 +103,14 @@ function believed(values) {
   return values ? { value: values[0], sd: three(values[1]), bound: values[2] } : { value: null };
 }
 
+function shown(values, scale) {
+  return Object.fromEntries(Object.entries(values).map(([name, value]) => [name, value == null ? value : scale * value]));
+}
+
 // What an old message says is no value of now.
 function sample(f) {
   const now = { ...f, estimate: f.estimate?.age < FRESH_S ? f.estimate : null, command: f.command?.age < FRESH_S ? f.command : null };
-  CURVES.forEach((curve, k) => strips[k].strip.add({ t: f.t, wraps: curve.wraps, ...curve.get(now) }));
+  CURVES.forEach((curve, k) => strips[k].strip.add({ t: f.t, wraps: curve.wraps, ...shown(curve.get(now), curve.scale ?? 1) }));
 }
 
 function lay() {
@@ -117,7 +122,7 @@ function lay() {
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", `${curve.name} in ${curve.unit} over the last 30 seconds`);
     figure.append(caption, canvas);
-    return { figure, value, curve, strip: new Strip(canvas, curve.hue, curve.least, curve.limits?.(config) ?? []) };
+    return { figure, value, curve, strip: new Strip(canvas, curve.hue, curve.least, (curve.limits?.(config) ?? []).map(limit => (curve.scale ?? 1) * limit)) };
   });
   put($("strips"), ...strips.map(each => each.figure));
   $("which").hidden = config.followers.length < 2;
@@ -198,7 +203,7 @@ function robots() {
 
 // A cell with speed and turn rate, how old they are, and whether that is a robot that stands.
 function motion(values, age, stands, otherwise) {
-  const cell = make("td", values ? stands ? "stands" : `${signed(values[0], 3)}, ${signed(values[1], 2)}` : otherwise);
+  const cell = make("td", values ? stands ? "stands" : `${signed(values[0], 3)}, ${signed(DEGREES * values[1], 0)}` : otherwise);
   if (values) cell.append(make("small", `${seconds(age)} ago`, old(age) ? "bad" : ""));
   return cell;
 }

@@ -142,7 +142,7 @@ function* broken(run, get, x, y, height) {
   let last = null;
   for (const each of run) {
     const place = [x(each.t), y(get(each))];
-    if (last !== null && each.wraps && Math.abs(get(each) - last) > Math.PI) yield null;
+    if (last !== null && each.wraps && Math.abs(get(each) - last) > 180) yield null;
     last = get(each);
     yield [place[0], Math.max(-height, Math.min(2 * height, place[1]))];
   }
