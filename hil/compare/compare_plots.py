@@ -34,7 +34,14 @@ _COURSES = (
     ("shape", "alpha1", "Bearing α₁", "α₁ [deg]", math.degrees(1.0), "Where the leader sees the follower."),
     ("shape", "alpha2", "Bearing α₂", "α₂ [deg]", math.degrees(1.0), "Where the follower sees the leader."),
     ("commands", "v2", "Commanded speed v₂", "v₂ [m/s]", 1.0, "What the follower was told."),
-    ("commands", "u2", "Commanded turn rate u₂", "u₂ [deg/s]", math.degrees(1.0), "What the follower was told."),
+    (
+        "commands",
+        "u2",
+        "Commanded turn rate u₂",
+        "u₂ [deg/s]",
+        math.degrees(1.0),
+        "What the follower was told.",
+    ),
 )
 _ROW = 44
 

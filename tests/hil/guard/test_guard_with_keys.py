@@ -48,12 +48,13 @@ def test_a_guarded_robot_obeys_the_controller_and_the_operator_and_nobody_else(t
         try:
             driver = Driver(lab.wire("robot", scenario), lab.wire("controller", scenario))
             operator = lab.wire("operator", scenario)
+            # Before anybody drives: while they join no command is fresh.
+            strangers = [lab.wire(role, scenario, strict=False) for role in ("viewer", "mocap", "estimator")]
 
             def order(topic: str, word: str) -> None:
                 operator.publish(topic, encode(String(data=word)))
 
             driver.until(FORWARD, lambda: order(topics.ARM, "follower"))
-            strangers = [lab.wire(role, scenario, strict=False) for role in ("viewer", "mocap", "estimator")]
             still = encode(drive_message(STANDSTILL, time.time_ns(), "follower", stamped=True))
             told: set[Motion] = set()
             for _ in range(50):

@@ -54,8 +54,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_a_chain_leaves_log_summary_and_picture(folder: Path) -> None:
-    assert {path.name for path in folder.iterdir()} == {"run.mcap", "summary.json", "run.png"}
+def test_a_chain_leaves_log_summary_picture_and_page(folder: Path) -> None:
+    left = {"run.mcap", "summary.json", "run.png", "report.html"}
+    assert {path.name for path in folder.iterdir()} == left
     summary = json.loads((folder / "summary.json").read_text())
     assert (summary["agents"], summary["mode"], summary["recovered"]) == (3, "lockstep", True)
     assert [(pair["leader"], pair["follower"]) for pair in summary["pairs"]] == [
