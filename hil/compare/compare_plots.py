@@ -27,19 +27,20 @@ from hil.reports.plots import (
 LOOKS = ((BLUE, "solid"), (VERMILION, "dashed"), (PURPLE, "dotted"), (GREY, "solid"))
 """Colour and dash of each group's lines, in turn."""
 
+_DEGREES = math.degrees(1.0)
 _COURSES = (
     ("shape", "rho", "Distance ρ", "ρ [m]", 1.0, "The distance between the robots."),
     ("errors", "v1", "Error of v₁", "v₁ error [mm/s]", 1e3, "Leader's speed, estimate minus truth."),
-    ("errors", "alpha1", "Error of α₁", "α₁ error [deg]", math.degrees(1.0), "Estimate minus truth."),
-    ("shape", "alpha1", "Bearing α₁", "α₁ [deg]", math.degrees(1.0), "Where the leader sees the follower."),
-    ("shape", "alpha2", "Bearing α₂", "α₂ [deg]", math.degrees(1.0), "Where the follower sees the leader."),
+    ("errors", "alpha1", "Error of α₁", "α₁ error [deg]", _DEGREES, "Estimate minus truth."),
+    ("shape", "alpha1", "Bearing α₁", "α₁ [deg]", _DEGREES, "Where the leader sees the follower."),
+    ("shape", "alpha2", "Bearing α₂", "α₂ [deg]", _DEGREES, "Where the follower sees the leader."),
     ("commands", "v2", "Commanded speed v₂", "v₂ [m/s]", 1.0, "What the follower was told."),
     (
         "commands",
         "u2",
         "Commanded turn rate u₂",
         "u₂ [deg/s]",
-        math.degrees(1.0),
+        _DEGREES,
         "What the follower was told.",
     ),
 )
