@@ -8,7 +8,10 @@ import click
 
 from hil.commands.outputs import OutputFolder
 from hil.errors import CheckFailedError, UsageError
-from hil.log.report_json import print_json, results_apart, say
+from hil.extras import left_out_if_missing
+from hil.log.report_json import print_json, results_apart, say, write_json
+from hil.log.written_aside import write_text_aside
+from hil.reports.judged_log import made_folder
 
 
 @click.command("compare")
@@ -41,9 +44,13 @@ def command(paths: tuple[Path, ...], conditions: tuple[str, ...], out: Path | No
     comparison = compared(groups, failures_of(parsed, groups))
     say(comparison_text(comparison))
     if out is not None:
-        from hil.compare.compare_page import leave_comparison
+        write_json(comparison.as_json(), made_folder(out) / "compare.json")
+        with left_out_if_missing("compare.html"):
+            from hil.compare.compare_page import compare_page
 
-        say(f"look at {leave_comparison(comparison, out)}")
+            page = out / "compare.html"
+            write_text_aside(page, compare_page(comparison))
+            say(f"look at {page}")
     if as_json:
         print_json(comparison.as_json())
     if comparison.failures:

@@ -88,7 +88,6 @@ def command(
     --from and --to are seconds since the leader set off, for imported recordings the source's own time; the
     steps always begin where the log does.
     """
-    refuse_nowhere(figures, out)
     from hil.log.log_folder import is_folder_of_logs
     from hil.log.opened import opened_log
 
@@ -99,7 +98,8 @@ def command(
         begin_to_judge("replay")
     # First of all: what replays takes over a second to load, and to compile where that is still to be done.
     if many:
-        refuse_for_folder(log, {"--csv": table, "--propose-map": propose})
+        refuse_for_folder(log, {"--csv": table, "--propose-map": propose, "--figures": figures})
+    refuse_nowhere(figures, out)
     given = None if many else opened_log(log)
     if given is not None and propose:
         from hil.replay.proposed_map import proposed_map
@@ -133,7 +133,8 @@ def command(
 
         _refuse_table(table, chain)
         done = _followed(given, choice, interrupt)
-        leave_replay(given, done, out, figures, as_json=as_json, verify=verify, strict=strict)
+        compares = verify and not _nothing_compared(interrupt, done)
+        leave_replay(given, done, out, figures, as_json=as_json, verify=compares, strict=strict)
         _refuse_interrupted(interrupt)
         _refuse_damage(given, done)
         return
@@ -152,7 +153,7 @@ def command(
             note(f"the {name} was started again during the run (times: {restarts})")
     if as_json:
         print_json(summary)
-    if verify and (reason := done.why_not_same(given)):
+    if verify and not _nothing_compared(interrupt, done) and (reason := done.why_not_same(given)):
         raise CheckFailedError(reason)
     if strict and (broken := violated_bounds(summary)):
         counts = ", ".join(f"{name} by {count}" for name, count in broken.items())
@@ -172,6 +173,12 @@ def _followed(log: Log, choice: ReplayChoice, interrupt: Interrupt) -> Replayed:
             return interrupt.go_on()
 
         return replayed(log, replace(choice, go_on=go_on))
+
+
+def _nothing_compared(interrupt: Interrupt, done: Replayed) -> bool:
+    """Whether a replay was interrupted before anything of it could be compared."""
+    parity = done.summary.get("parity", {}).values()
+    return bool(interrupt.number) and not any(part["compared"] for part in parity)
 
 
 def _refuse_interrupted(interrupt: Interrupt) -> None:

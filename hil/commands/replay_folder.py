@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from hil.commands.outputs import refuse_no_folder
 from hil.commands.progress import progress
 from hil.errors import AbreastError, CheckFailedError, UsageError
+from hil.extras import left_out_if_missing
 from hil.log.report_json import print_json, say
 from hil.log.written_aside import write_text_aside
 from hil.reports.judged_log import leave, made_folder, results_in
@@ -48,10 +49,16 @@ def replay_folder(
             progress=tell,
         )
     made_folder(place)
-    if not result.get("interrupted"):
-        _report_worst(result, choice, place)
+    # Before anything is drawn: hours of judging may be behind it.
     write_judged(result, place)
-    write_text_aside(place / "report.html", logs_report(result, place))
+    if not result.get("interrupted"):
+        try:
+            _report_worst(result, choice, place)
+        except KeyboardInterrupt:
+            result["interrupted"] = True
+        write_judged(result, place)
+    with left_out_if_missing("report.html"):
+        write_text_aside(place / "report.html", logs_report(result, place))
     for line in _lines(result, logs_verdict(result)):
         say(line)
     say(results_in(place))

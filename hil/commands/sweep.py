@@ -124,7 +124,7 @@ def _say(result: dict[str, Any]) -> None:
 
     cells = result["cells"]
     speed = result["run_seconds"] / result["wall_s"]
-    for line in sweep_verdict(cells).lines():
+    for line in sweep_verdict(result).lines():
         say(line)
     if off := sum(bool(nees_finding(cell)) for cell in cells):
         say(f"in {off} of {len(cells)} cells the deviations are not what the errors are (nees)")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from html import escape
-from pathlib import Path
 
 from hil.compare.compare_plots import course_panels, span_of, spread_panels
 from hil.compare.comparison import Comparison, shortened
@@ -12,19 +11,9 @@ from hil.compare.courses import Course, course_of
 from hil.compare.group import RUNS
 from hil.compare.metrics import is_told
 from hil.compare.ratio_maps import labels_of_maps, ratio_maps
-from hil.log.report_json import write_json
-from hil.log.written_aside import write_text_aside
 from hil.reports.heat_maps import SWITCH, choices_html
-from hil.reports.judged_log import made_folder
 from hil.reports.page import Section, Timeline, page, table_html
 from hil.reports.scroll_frame import FRAME_STYLE, framed
-
-
-def leave_comparison(comparison: Comparison, folder: Path) -> Path:
-    """Write ``compare.json`` and ``compare.html``, and give the path of the latter."""
-    write_json(comparison.as_json(), made_folder(folder) / "compare.json")
-    write_text_aside(folder / "compare.html", compare_page(comparison))
-    return folder / "compare.html"
 
 
 def compare_page(comparison: Comparison) -> str:

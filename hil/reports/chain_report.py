@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -15,8 +16,9 @@ from controllers.chain import ChainTrajectory
 from formation.angles import FloatArray
 from hil.figures.plot_data import broken_at_jumps
 from hil.judge.chain_text import chain_cells
+from hil.judge.replay_verdict import violated_bounds
 from hil.judge.run_data import RunData
-from hil.judge.summary_text import warnings_of
+from hil.judge.summary_text import BAD, parity_line, warnings_of
 from hil.reports.colours import AGENTS, LIMIT
 from hil.reports.notation import written
 from hil.reports.page import Section, Timeline, page, table_html
@@ -66,9 +68,14 @@ def _verdict(summary: Mapping[str, Any]) -> str:
         told.append(f"Not at their station at the end: {', '.join(lost)}")
     elif known:
         told.append("All followers are at their station at the end")
+    if violated := [str(pair["follower"]) for pair in pairs if violated_bounds(pair)]:
+        told.append(f"Bounds were violated by {', '.join(violated)}")
+    parity = list(parity_line(summary))
+    told += [f"Replay: {text}" for _, text, _ in parity]
+    wrong = bool(lost or violated) or any(style == BAD for _, _, style in parity)
     if doubtful:
         told.append(f"{', '.join(doubtful)} {'deserve' if len(doubtful) > 1 else 'deserves'} a second look")
-    style = "bad" if lost else "warn" if doubtful else "good"
+    style = "bad" if wrong else "warn" if doubtful else "good"
     says = "; ".join(told) or "Nothing speaks against the run"
     linked = '<p><a href="#followers">What each follower did</a></p>'
     return f'<div class="verdict {style}"><p><strong>{escape(says)}.</strong></p>{linked}</div>\n'
@@ -153,7 +160,7 @@ def _made(runs: Sequence[RunData], names: Sequence[str], summary: Mapping[str, A
     whole = provenance_html(runs[0], summary)
     if log is None:
         return whole
-    each = f"abreast replay {log.path} --follower {names[-1]} --out DIR"
+    each = f"{shlex.join(['abreast', 'replay', str(log.path), '--follower', names[-1]])} --out DIR"
     return (
         f"{whole}<p><code>{escape(each)}</code> makes the report of one follower, with all its estimates.</p>"
     )

@@ -28,6 +28,9 @@ def sweep_report(results: Mapping[str, Any]) -> str:
     page by the run's number as text; these are linked. What a cell does not know is left out.
     """
     cells: Sequence[Cell] = results["cells"]
+    if results.get("interrupted"):
+        # Cells are numbered in the whole sweep, of which some may be missing here: no run is named by them.
+        cells = [{name: value for name, value in cell.items() if name != "worst_run"} for cell in cells]
     sections = [Section("By estimator", _by_estimator(cells))]
     if cells:
         names = [_name(cell) for cell in cells]
@@ -46,7 +49,7 @@ def sweep_report(results: Mapping[str, Any]) -> str:
 
 def _head(results: Mapping[str, Any]) -> str:
     cells: Sequence[Cell] = results["cells"]
-    verdict = sweep_verdict(cells)
+    verdict = sweep_verdict(results)
     samples = sum(int(cell["samples"]) for cell in cells)
     off = [text for cell in cells if (text := nees_finding(cell))]
     facts = {

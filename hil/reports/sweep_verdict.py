@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from hil.reports.sweep_cells import Cell, estimators_of
 
@@ -24,8 +25,19 @@ class SweepVerdict:
         return self.text, *self.others
 
 
-def sweep_verdict(cells: Sequence[Cell]) -> SweepVerdict:
-    """Verdict on a sweep: bad where an extended bound was violated, a run diverged, or nothing was judged."""
+def sweep_verdict(results: Mapping[str, Any]) -> SweepVerdict:
+    """Verdict on the JSON of a sweep.
+
+    Bad where an extended bound was violated, a run diverged, nothing was judged, or it was broken off.
+    """
+    cells: Sequence[Cell] = results["cells"]
+    verdict = _on_cells(cells)
+    if not results.get("interrupted"):
+        return verdict
+    return replace(verdict, text=f"Broken off after {results['runs_done']} runs. {verdict.text}", bad=True)
+
+
+def _on_cells(cells: Sequence[Cell]) -> SweepVerdict:
     asked, foils = estimators_of(cells)
     own = [cell for cell in cells if str(cell["estimator"]) in asked]
     samples = sum(int(cell["samples"]) for cell in own)

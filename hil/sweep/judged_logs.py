@@ -13,6 +13,7 @@ from typing import Any
 
 from hil import __version__
 from hil.errors import AbreastError, UsageError
+from hil.extras import left_out_if_missing
 from hil.judge.dotted_figures import figures_of
 from hil.judge.made_by import law_name
 from hil.judge.replay_verdict import violated_bounds
@@ -111,9 +112,13 @@ def judge_logs(
 
 
 def write_judged(result: Mapping[str, Any], folder: Path) -> None:
-    """Write ``results.json`` and ``results.parquet``, a row for each log with its figures."""
-    write_table([_flat_row(row) for row in result["logs"]], folder / "results.parquet")
+    """Write ``results.json`` and ``results.parquet``, a row for each log with its figures.
+
+    The latter is left out where its extra is missing, and that is said on stderr.
+    """
     write_json(result, folder / "results.json")
+    with left_out_if_missing("results.parquet"):
+        write_table([_flat_row(row) for row in result["logs"]], folder / "results.parquet")
 
 
 def _flat_row(row: Mapping[str, Any]) -> dict[str, Any]:

@@ -58,10 +58,11 @@ def shared_on_cluster(
 
     ``key``: what tells an item, and what is done with it, from all others. What a lost worker had begun or
     held goes to another. Raises :class:`UsageError` if the scheduler cannot be reached or Dask is not
-    installed.
+    installed, and :class:`LostWorkerError` for an item that ended one worker after another.
     """
     try:
         distributed: Any = importlib.import_module("distributed")
+        killed = importlib.import_module("distributed.scheduler").KilledWorker
     except ModuleNotFoundError as error:
         raise needs_extra(f"--scheduler {scheduler}", error) from None
     try:
@@ -73,7 +74,11 @@ def shared_on_cluster(
         ) from None
     with client:
         waiting = {client.submit(task, item, key=key(item), retries=5): item for item in items}
-        for done, result in distributed.as_completed(waiting, loop=client.loop, with_results=True):
+        for done in distributed.as_completed(waiting, loop=client.loop):
+            try:
+                result = done.result()
+            except killed as error:
+                raise LostWorkerError(f"workers died over {waiting[done]}: {error}") from None
             yield waiting[done], result
 
 

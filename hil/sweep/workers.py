@@ -18,12 +18,7 @@ Done = tuple[Piece, NDArray[np.void]]
 
 def fly_here(sweep: Sweep, pieces: Sequence[Piece], workers: int) -> Iterator[Done]:
     """Tallies of pieces as they are done, by so many processes; one worker is this process itself."""
-    try:
-        yield from shared_here(partial(fly_piece, sweep), pieces, workers)
-    except LostWorkerError:
-        raise CheckFailedError(
-            "a worker of the sweep died; what was done is kept: run the same command again to go on"
-        ) from None
+    yield from _kept(shared_here(partial(fly_piece, sweep), pieces, workers))
 
 
 def fly_on_cluster(sweep: Sweep, pieces: Sequence[Piece], scheduler: str) -> Iterator[Done]:
@@ -33,4 +28,14 @@ def fly_on_cluster(sweep: Sweep, pieces: Sequence[Piece], scheduler: str) -> Ite
     """
     digest = sweep.digest()
     task = partial(fly_piece, sweep)
-    yield from shared_on_cluster(task, pieces, scheduler, lambda piece: f"{digest}-{piece.name}")
+    yield from _kept(shared_on_cluster(task, pieces, scheduler, lambda piece: f"{digest}-{piece.name}"))
+
+
+def _kept(work: Iterator[Done]) -> Iterator[Done]:
+    """What comes of work, and where a worker is lost what to do about it."""
+    try:
+        yield from work
+    except LostWorkerError:
+        raise CheckFailedError(
+            "a worker of the sweep died; what was done is kept: run the same command again to go on"
+        ) from None

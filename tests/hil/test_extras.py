@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from hil.extras import EXTRA_OF, left_out_if_missing, missing_extra
+from hil.log.reader import Log
 
 ROOT = Path(__file__).resolve().parents[2]
 HOUSE = ("formation", "controllers", "estimation", "hil", "abreast")
@@ -126,6 +127,27 @@ def test_an_experiment_without_pictures_leaves_its_table(tmp_path: Path) -> None
         "no stability.png: pip install 'abreast[report]'",
     ]
     assert {path.name for path in tmp_path.iterdir()} == {"trajectory.csv"}
+
+
+def test_a_comparison_and_a_folder_of_logs_keep_their_exit_codes_without_pages_and_tables(
+    tmp_path: Path, short_log: Log
+) -> None:
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    for name in ("one", "two"):
+        (logs / f"{name}.mcap").write_bytes(Path(short_log.path).read_bytes())
+    judged = tmp_path / "judged"
+    done = without("bokeh,pyarrow,matplotlib", "replay", str(logs), "--workers", "1", "--out", str(judged))
+    assert done.returncode == 0, done.stderr
+    assert "2 of 2 logs judged" in done.stdout
+    assert "no results.parquet" in done.stderr
+    assert (judged / "results.json").exists()
+    pair = (str(logs / "one.mcap"), str(logs / "two.mcap"))
+    wrong = ("--fail-if", "estimation.rmse.v1 > 0.5", "--out", str(tmp_path / "beside"))
+    done = without("bokeh,pyarrow,matplotlib", "compare", *pair, *wrong)
+    assert done.returncode == 1, done.stderr
+    assert "estimation.rmse.v1" in done.stderr
+    assert (tmp_path / "beside" / "compare.json").exists()
 
 
 def test_a_sweep_without_tables_and_pages_leaves_its_results(tmp_path: Path) -> None:

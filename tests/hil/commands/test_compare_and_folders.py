@@ -97,6 +97,16 @@ def test_a_folder_of_logs_is_judged_to_its_end(capsys: pytest.CaptureFixture[str
     assert json.loads(out)["verdict"].get("best") is None, "what is the same is alike"
 
 
+def test_figures_of_a_folder_of_logs_are_refused_with_their_reason(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.mcap").write_bytes(b"")
+    code, _, said = abreast(capsys, "replay", tmp_path, "--figures", "pdf")
+    assert code == 2
+    assert "--figures: is for a single log" in said
+
+
 def test_what_is_for_one_log_or_for_many_is_said(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -58,6 +58,23 @@ def test_a_follower_that_waits_for_its_predecessor_is_not_told_of_as_standing(
     assert "stand still" not in words(chain_report(scenario, runs, None, summary))
 
 
+def test_a_chain_that_a_replay_does_not_repeat_or_whose_bounds_broke_is_bad(
+    driven: tuple[Scenario, list[RunData], dict[str, Any]],
+) -> None:
+    scenario, runs, summary = driven
+    assert 'class="verdict bad"' not in chain_report(scenario, runs, None, summary)
+    differs = summary | {"parity": {"estimates": {"compared": 9, "mismatched": 2}}}
+    page = chain_report(scenario, runs, None, differs)
+    assert 'class="verdict bad"' in page
+    assert "9 messages compared, 2 differ" in words(page)
+    first = summary["pairs"][0]
+    violated = first | {"bounds": first["bounds"] | {"violations": {"v1_extended": 3}}}
+    broken = summary | {"pairs": [violated, *summary["pairs"][1:]]}
+    page = chain_report(scenario, runs, None, broken)
+    assert 'class="verdict bad"' in page
+    assert f"Bounds were violated by {first['follower']}" in words(page)
+
+
 def test_without_truth_there_is_no_picture_but_what_each_did(
     driven: tuple[Scenario, list[RunData], dict[str, Any]],
 ) -> None:

@@ -110,6 +110,17 @@ def test_the_head_is_about_the_estimators_asked_about_and_names_foils(results: d
     assert "foil" not in said, "who asks for a foil alone asks about it"
 
 
+def test_a_sweep_that_was_broken_off_says_so_first_and_names_no_run_by_a_cell(
+    results: dict[str, Any],
+) -> None:
+    results |= {"interrupted": True, "runs_done": 123}
+    results["cells"][0]["worst_run"] = 4
+    page = sweep_report(results)
+    assert "Broken off after 123 runs. ekf and ukf: " in words(page)
+    assert 'class="verdict bad"' in page
+    assert "--keep" not in words(page)
+
+
 def test_a_violated_extended_bound_is_bad(results: dict[str, Any]) -> None:
     assert 'class="verdict bad"' not in sweep_report(results)
     results["cells"][0]["bounds"]["violations"]["h_extended"] = 3
