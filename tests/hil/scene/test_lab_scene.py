@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterable
 from typing import Any
@@ -16,6 +17,7 @@ from hil.scene.markers import Marker, MarkerArray
 from hil.scene.robot_size import HEIGHT, WIDTH
 from hil.wire.message_types import (
     Command,
+    Header,
     LeaderEstimate,
     Message,
     Odometry,
@@ -24,6 +26,7 @@ from hil.wire.message_types import (
     Quaternion,
     RigidBodies,
     RigidBody,
+    Time,
     Twist,
     TwistWithCovariance,
     Vector3,
@@ -68,10 +71,10 @@ def command(stop: str = "") -> Command:
 
 
 def shown(messages: Iterable[tuple[str, Message]], *settings: str) -> tuple[TFMessage, list[Marker]]:
-    """What is shown at last of messages that come one second apart."""
+    """What is shown at last of messages that come a tenth of a second apart."""
     scene, told = LabScene(load_scenario("turtlebot3", settings)), dict[str, Outgoing]()
     for number, (topic, message) in enumerate(messages):
-        told |= {each.topic: each for each in scene.hear(topic, encode(message), NOW + number * 10**9)}
+        told |= {each.topic: each for each in scene.hear(topic, encode(message), NOW + number * 10**8)}
     transforms, markers = decode_as(told[TF].payload, TFMessage), decode_as(told[SCENE].payload, MarkerArray)
     found: list[Any] = list(markers.markers)
     return transforms, found
@@ -192,3 +195,30 @@ def test_it_is_told_as_often_as_eyes_can_follow_and_again_after_a_jump_back() ->
 @pytest.mark.parametrize("topic", ["rigid_bodies", "follower/leader_estimate", "diagnostics", "elsewhere"])
 def test_what_cannot_be_read_is_passed_over(topic: str) -> None:
     assert not list(LabScene(load_scenario("turtlebot3")).hear(topic, b"\0\1\0\0nothing", NOW))
+
+
+@pytest.mark.parametrize("field", ["status", "stamp"])
+def test_an_estimate_that_is_none_is_passed_over_and_not_kept(field: str) -> None:
+    odd = estimate(status=200) if field == "status" else estimate()
+    if field == "stamp":
+        odd = dataclasses.replace(odd, header=Header(Time(sec=-1, nanosec=0), "follower"))
+    odd_ones: list[tuple[str, Message]] = [("follower/leader_estimate", odd), ("rigid_bodies", frame())]
+    _, markers = shown([*EVERYTHING, *odd_ones])
+    assert "tracking" in of(markers, 20).text, "by the estimate before"
+
+
+def test_a_robot_that_the_motion_capture_has_lost_is_shown_no_longer() -> None:
+    alone = RigidBodies(header(NOW, "mocap"), 1, frame().rigidbodies[1:])
+    later: list[tuple[str, Message]] = [("rigid_bodies", alone)] * 12
+    transforms, markers = shown([*EVERYTHING, *later[:7]])
+    assert {each.child_frame_id for each in transforms.transforms} == {"leader", "follower"}
+    transforms, markers = shown([*EVERYTHING, *later])
+    assert [each.child_frame_id for each in transforms.transforms] == ["follower"]
+    assert {each.header.frame_id for each in markers} == {"follower"}
+
+
+def test_an_estimate_and_a_command_of_nodes_that_are_gone_are_shown_no_longer() -> None:
+    later: list[tuple[str, Message]] = [("rigid_bodies", frame())] * 12
+    _, markers = shown([*EVERYTHING[:2], ("follower/command", command("no estimate")), *later])
+    assert {each.id for each in markers if each.ns == "follower/estimate"} == {0, 21}
+    assert "no estimate" not in of(markers, 21).text
