@@ -120,7 +120,8 @@ class PairState:
             return {}
         line = follower.theta + told.alpha2
         at = follower.x + told.rho * math.cos(line), follower.y + told.rho * math.sin(line)
-        return {self.link.leader: Pose(*at, line + math.pi - told.alpha1)}
+        pose = Pose(*at, line + math.pi - told.alpha1)
+        return {self.link.leader: pose} if all(map(math.isfinite, pose)) else {}
 
     def seen(self, now_ns: int, stands: Mapping[str, Pose]) -> SeenPair | None:
         """What there is to draw of the pair, None before both have been seen."""
@@ -147,11 +148,14 @@ class PairState:
             return None
         # The heading of its very capture: the robot has turned since.
         heading = self._headings.get(to_ns(told.header.stamp), follower.theta)
+        theta = heading + told.alpha2 + math.pi - told.alpha1
+        if not math.isfinite(theta):
+            return None
         variances = told.covariance[::6]
         status = Status(told.status)
         along, across = self._position_sds(told)
         return Believed(
-            theta=heading + told.alpha2 + math.pi - told.alpha1,
+            theta=theta,
             alpha1=told.alpha1,
             v1=told.v1,
             sd_v1=math.sqrt(max(0.0, float(variances[2]))),

@@ -55,6 +55,14 @@ def frame(leader: Pose = LEADS, follower: Pose = FOLLOWS) -> RigidBodies:
     return RigidBodies(header(NOW, "mocap"), 1, bodies)
 
 
+ODOMETRY = Odometry(
+    header=header(NOW, "odom"),
+    child_frame_id="base",
+    pose=PoseWithCovariance(pose=placed(FOLLOWS), covariance=np.zeros(36)),
+    twist=TwistWithCovariance(twist=STILL, covariance=np.zeros(36)),
+)
+
+
 def estimate(**changes: object) -> LeaderEstimate:
     told = {
         "rho": SHAPE.rho, "alpha2": SHAPE.alpha2, "rho_dot": 0.0, "alpha2_dot": 0.0, "v1": 0.1,
@@ -168,13 +176,7 @@ def test_what_is_not_trusted_is_not_drawn() -> None:
 
 
 def test_without_motion_capture_the_leader_is_where_the_estimate_has_it_from_the_odometry() -> None:
-    odometry = Odometry(
-        header=header(NOW, "odom"),
-        child_frame_id="base",
-        pose=PoseWithCovariance(pose=placed(FOLLOWS), covariance=np.zeros(36)),
-        twist=TwistWithCovariance(twist=STILL, covariance=np.zeros(36)),
-    )
-    transforms, _ = shown([("follower/leader_estimate", estimate()), ("follower/odom", odometry)])
+    transforms, _ = shown([("follower/leader_estimate", estimate()), ("follower/odom", ODOMETRY)])
     at = {each.child_frame_id: each.transform for each in transforms.transforms}["leader"]
     assert (at.translation.x, at.translation.y) == pytest.approx(LEADS[:2])
     assert 2.0 * math.atan2(at.rotation.z, at.rotation.w) % math.tau == pytest.approx(LEADS.theta)
@@ -205,6 +207,17 @@ def test_an_estimate_that_is_none_is_passed_over_and_not_kept(field: str) -> Non
     odd_ones: list[tuple[str, Message]] = [("follower/leader_estimate", odd), ("rigid_bodies", frame())]
     _, markers = shown([*EVERYTHING, *odd_ones])
     assert "tracking" in of(markers, 20).text, "by the estimate before"
+
+
+@pytest.mark.parametrize("framed", [True, False])
+def test_angles_that_are_none_are_not_drawn(framed: bool) -> None:
+    wild = ("follower/leader_estimate", estimate(alpha2=1.7e308, alpha1=-1.7e308))
+    place: tuple[str, Message] = ("rigid_bodies", frame()) if framed else ("follower/odom", ODOMETRY)
+    transforms, markers = shown([wild, place])
+    assert {each.child_frame_id for each in transforms.transforms} == (
+        {"leader", "follower"} if framed else {"follower"}
+    )
+    assert 20 not in {each.id for each in markers}
 
 
 def test_a_robot_that_the_motion_capture_has_lost_is_shown_no_longer() -> None:
