@@ -9,7 +9,8 @@ from abreast._runs import Run, run_of
 from abreast._scenarios import Own, text_of
 from formation.collector import collector_paused
 from hil.errors import CheckFailedError
-from hil.exports.table_export import TableExport, export_tables, refuse_present
+from hil.exports.refusal import refuse_present
+from hil.exports.table_export import TABLES, TableExport, export_tables
 from hil.exports.table_file import Format
 from hil.judge.replayed import ReplayChoice, replayed
 from hil.log.opened import opened_log
@@ -123,7 +124,7 @@ def export(
     """
     place = Path(folder)
     if not overwrite:
-        refuse_present(place)
+        refuse_present(place, TABLES)
     choice = ReplayChoice(
         estimator=text_of(estimator),
         leader=leader,

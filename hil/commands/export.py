@@ -56,14 +56,10 @@ def command(
     transforms, a scene, and layouts. Estimates are those of the log; where it has none they are made as
     replay does. docs/export.md has all columns, docs/foxglove.md the viewers.
     """
-    if layouts is not None:
-        from hil.exports.layouts import write_layouts
-
-        for path in write_layouts(layouts):
-            print_text(f"{path}\n")
     if log is None or folder is None:
         if layouts is None or log is not None or folder is not None:
             raise UsageError("export: expected LOG and --to DIR, or --layouts DIR alone")
+        _write_layouts(layouts, overwrite=overwrite)
         return
     from hil.judge.replayed import ReplayChoice
     from hil.log.opened import opened_log
@@ -77,19 +73,42 @@ def command(
         in_messages=True,
     )
     begin_to_judge("export")
+    if not overwrite:
+        _refuse_present(folder, form)
+    if layouts is not None:
+        _write_layouts(layouts, overwrite=overwrite)
     write = _write_foxglove if form == "foxglove" else _write_tables
-    write(opened_log(log), folder, form, choice, overwrite=overwrite, as_json=as_json)
+    write(opened_log(log), folder, form, choice, as_json=as_json)
+
+
+def _refuse_present(folder: Path, form: str | None) -> None:
+    from hil.exports.refusal import refuse_present
+
+    if form == "foxglove":
+        from hil.exports.foxglove_export import WRITTEN
+
+        refuse_present(folder, WRITTEN)
+    else:
+        from hil.exports.table_export import TABLES
+
+        refuse_present(folder, TABLES)
+
+
+def _write_layouts(folder: Path, *, overwrite: bool) -> None:
+    from hil.exports.layouts import LAYOUTS, write_layouts
+    from hil.exports.refusal import refuse_present
+
+    if not overwrite:
+        refuse_present(folder, LAYOUTS)
+    for path in write_layouts(folder):
+        print_text(f"{path}\n")
 
 
 def _write_foxglove(
-    log: Log, folder: Path, _form: str | None, choice: ReplayChoice, *, overwrite: bool, as_json: bool
+    log: Log, folder: Path, _form: str | None, choice: ReplayChoice, *, as_json: bool
 ) -> None:
     from hil.exports.foxglove_export import export_foxglove
-    from hil.exports.foxglove_file import FILE
-    from hil.exports.table_export import refuse_present
 
-    if not overwrite:
-        refuse_present(folder, [FILE])
     done = export_foxglove(log, folder, choice)
     _tell_left_out(done.left_out)
     if as_json:
@@ -99,14 +118,10 @@ def _write_foxglove(
     _refuse_damage(log, done.damage)
 
 
-def _write_tables(
-    log: Log, folder: Path, form: str | None, choice: ReplayChoice, *, overwrite: bool, as_json: bool
-) -> None:
-    from hil.exports.table_export import export_tables, refuse_present
+def _write_tables(log: Log, folder: Path, form: str | None, choice: ReplayChoice, *, as_json: bool) -> None:
+    from hil.exports.table_export import export_tables
     from hil.exports.table_file import has_parquet
 
-    if not overwrite:
-        refuse_present(folder)
     if form is None and not has_parquet():
         note("tables are written as CSV; for Parquet: pip install 'abreast[tables]'")
     chosen: Format = "csv" if form == "csv" or (form is None and not has_parquet()) else "parquet"

@@ -7,7 +7,7 @@ from heapq import merge
 from pathlib import Path
 
 from hil.exports.foxglove_file import FILE, RECORDED, FoxgloveExport, Made, write_foxglove
-from hil.exports.layouts import write_layouts
+from hil.exports.layouts import LAYOUTS, write_layouts
 from hil.exports.sources import of_what_is_whole, recorded_links
 from hil.judge.replayed import ReplayChoice, Replayed, replayed
 from hil.log.metadata import scenario_of
@@ -19,6 +19,9 @@ from hil.scenario.links import links_of
 from hil.scenario.schema import Scenario
 from hil.wire.messages import to_ns
 from hil.wire.topics import link_topics, types_of
+
+WRITTEN = (FILE, *LAYOUTS)
+"""All that an export writes into its folder."""
 
 
 def export_foxglove(log: Log, folder: Path, choice: ReplayChoice) -> FoxgloveExport:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from heapq import merge
 from pathlib import Path
 from typing import Any
 
 from mcap.writer import Writer
 
 from hil.errors import UsageError
-from hil.log.reader import Log
+from hil.log.reader import Log, Record
 from hil.log.written_aside import written_aside
 from hil.nodes.node import Outgoing
 from hil.scenario.schema import Scenario
@@ -64,21 +65,25 @@ def write_foxglove(log: Log, scenario: Scenario, path: Path, made: Made = RECORD
     """
     done = FoxgloveExport(path, damage=log.damage)
     scene = LabScene(scenario)
-    besides = iter(made.messages)
     topics = [topic for topic in _readable(log, done) if topic.strip("/") not in made.instead]
+    told: tuple[Iterable[Outgoing | Record], ...] = (made.messages, log.records(topics))
     with _mcap(path) as writer:
         channels = _Channels(writer, log.definitions, done)
-        waiting = next(besides, None)
-        for record in log.records(topics):
-            while waiting is not None and waiting.stamp_ns <= record.log_ns:
-                if waiting.topic in made.instead:
-                    channels.add(waiting.topic, waiting.typename, waiting.payload, waiting.stamp_ns)
-                channels.add_all(scene.hear(waiting.topic, waiting.payload, waiting.stamp_ns))
-                waiting = next(besides, None)
-            channels.add(record.topic, record.typename, record.payload, record.log_ns, record.publish_ns)
-            if not made.alone:
-                channels.add_all(scene.hear(record.topic, record.payload, record.log_ns))
+        for each in merge(*told, key=_moment_ns):
+            at_ns = _moment_ns(each)
+            if isinstance(each, Outgoing):
+                kept, heard, publish_ns = each.topic in made.instead, True, at_ns
+            else:
+                kept, heard, publish_ns = True, not made.alone, each.publish_ns
+            if kept:
+                channels.add(each.topic, each.typename, each.payload, at_ns, publish_ns)
+            if heard:
+                channels.add_all(scene.hear(each.topic, each.payload, at_ns))
     return done
+
+
+def _moment_ns(each: Outgoing | Record) -> int:
+    return each.stamp_ns if isinstance(each, Outgoing) else each.log_ns
 
 
 def ros_name(topic: str) -> str:
@@ -111,20 +116,18 @@ class _Channels:
         self._schemas: dict[str, int] = {}
         self._channels: dict[tuple[str, str], int] = {}
 
-    def add(
-        self, topic: str, typename: str, payload: bytes, log_ns: int, publish_ns: int | None = None
-    ) -> None:
+    def add(self, topic: str, typename: str, payload: bytes, log_ns: int, publish_ns: int) -> None:
         """Append a message."""
         channel = self._channels.get((topic, typename))
         if channel is None:
             channel = self._declared(topic, typename)
-        self._writer.add_message(channel, log_ns, payload, log_ns if publish_ns is None else publish_ns)
+        self._writer.add_message(channel, log_ns, payload, publish_ns)
         self._done.messages[ros_name(topic)] = self._done.messages.get(ros_name(topic), 0) + 1
 
     def add_all(self, messages: Iterator[Outgoing]) -> None:
         """Append what is due now."""
         for each in messages:
-            self.add(each.topic, each.typename, each.payload, each.stamp_ns)
+            self.add(each.topic, each.typename, each.payload, each.stamp_ns, each.stamp_ns)
 
     def _declared(self, topic: str, typename: str) -> int:
         if typename not in self._schemas:

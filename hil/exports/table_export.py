@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hil.errors import UsageError
 from hil.exports.aligned_columns import ALIGNED_COLUMNS
 from hil.exports.aligned_table import aligned_rows
 from hil.exports.logged_run import LoggedRun, recorded_run, replayed_run
@@ -24,6 +23,9 @@ TOPICS = "topics"
 
 COLUMNS = "columns.csv"
 """What the columns of the aligned table are, beside one in CSV."""
+
+TABLES = ("aligned.csv", "aligned.parquet", COLUMNS, TOPICS)
+"""All that an export of any format may write into its folder."""
 
 
 @dataclass(slots=True)
@@ -70,15 +72,6 @@ def export_tables(log: Log, folder: Path, form: Format, choice: ReplayChoice) ->
     anew, as a replay does. Raises :class:`UsageError` for what cannot be replayed so or written.
     """
     return of_what_is_whole(log, lambda whole: _export(whole, folder, form, choice))
-
-
-def refuse_present(folder: Path, names: Sequence[str] = ("aligned.csv", "aligned.parquet", TOPICS)) -> None:
-    """Raise :class:`UsageError` for a folder in which an export lies already."""
-    there = [name for name in names if (folder / name).exists()]
-    if there:
-        raise UsageError(
-            f"{folder}: has {there[0]} already; give another folder, or overwrite it (--overwrite)"
-        )
 
 
 def _export(log: Log, folder: Path, form: Format, choice: ReplayChoice) -> TableExport:

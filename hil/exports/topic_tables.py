@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator, Mapping
+from collections.abc import Set as AbstractSet
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +23,8 @@ from hil.wire.messages import definition, known_types, typestore_of
 
 _MOST_ROWS, _MOST_BYTES = 1 << 14, 1 << 22
 _S = 1e-9
+_LONGEST = 180
+"""Bytes of a part of a file's name: with what is put before and behind, 255 are the most."""
 
 TIMES = (
     TableColumn("log_time.ns", "ns", "when the message was logged, since 1970"),
@@ -74,21 +78,31 @@ def topic_paths(topics: Mapping[str, str], form: Format) -> dict[str, str]:
     {'/follower/odom': 'follower/odom.csv', 'a b': 'a%20b.csv', '../x': '%2E%2E/x.csv'}
     """
     paths: dict[str, str] = {}
+    files: set[str] = set()
+    folders: set[str] = set()
     for topic in topics:
-        parts = [_part(part) for part in topic.split("/") if part] or ["unnamed"]
-        name, number = "/".join(parts), 1
-        while f"{name}.{form}" in paths.values():
-            number += 1
-            name = "/".join((*parts[:-1], f"{parts[-1]}-{number}"))
-        paths[topic] = f"{name}.{form}"
+        *above, last = [_part(part) for part in topic.split("/") if part] or ["unnamed"]
+        folder = ""
+        for part in above:
+            folder = _free(f"{folder}{part}", "", files) + "/"
+            folders.add(folder[:-1])
+        paths[topic] = _free(f"{folder}{last}", f".{form}", files | folders)
+        files.add(paths[topic])
     return paths
+
+
+def _free(name: str, ending: str, taken: AbstractSet[str]) -> str:
+    """The name with its ending, numbered where that is taken."""
+    numbered = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
+    return next(path for each in numbered if (path := f"{each}{ending}") not in taken)
 
 
 def _part(part: str) -> str:
     """A part of a topic's name as that of a file."""
-    if not part.strip("."):
-        return part.replace(".", "%2E")
-    return quote(part[:100], safe="~", errors="replace")
+    dots = not part.strip(".")
+    quoted = part.replace(".", "%2E") if dots else quote(part, safe="~", errors="replace")
+    # No cut within one of %XX: it would be another name, or none.
+    return quoted if len(quoted) <= _LONGEST else re.sub("%.?$", "", quoted[:_LONGEST])
 
 
 def _readable(log: Log, done: TopicTables) -> Iterator[str]:

@@ -71,8 +71,8 @@ def verdict_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     seed = f", seed {summary['seed']}" if "seed" in summary else ""
     title = f"{summary['scenario']}, {summary['mode']}, {summary['duration_s']:.1f} s ({who}{seed})"
     yield "run", title, PLAIN
-    if summary.get("truth") == "mocap":
-        yield "judged", "by the smoothed mocap tracks, whose own errors are in what follows", PLAIN
+    if judged := judged_by(summary):
+        yield "judged", judged, PLAIN
     yield from _estimate_lines(summary)
     yield from _certified_line(summary)
     formation = summary.get("formation", {})
@@ -86,6 +86,13 @@ def verdict_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     if "log" in summary:
         log = summary["log"]
         yield "log", f"{log['path']} ({log['messages']} messages, {log['bytes'] / 1e6:.1f} MB)", PLAIN
+
+
+def judged_by(summary: Mapping[str, Any]) -> str:
+    """What a run was judged by in place of the truth; empty where that is known."""
+    if summary.get("truth") != "mocap":
+        return ""
+    return "by the smoothed mocap tracks, whose own errors are in what follows"
 
 
 def parity_line(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:

@@ -24,16 +24,40 @@ def logs_in(folder: Path) -> list[Path]:
     Just the folder itself if that is one log: a bag with its metadata, or pieces that are numbered behind the
     folder's name. Files of other names are parts of one log if they are a stranger's and numbered or of one
     time; those of abreast only if they are numbered, say the same of themselves, and follow each other.
-    What begins with a dot is passed over. Empty if there are none.
+    What begins with a dot is passed over, and what a symbolic link in it leads to if that is found without
+    the link, or lies above it. Empty if there are none.
     """
-    files = sorted(
-        (each for each in folder.iterdir() if each.name.endswith(SUFFIXES) and each.is_file()), key=in_order
-    )
+    return _without_twins(_logs_in(folder, (folder.resolve(),)), folder)
+
+
+def _logs_in(folder: Path, above: tuple[Path, ...]) -> list[Path]:
+    """``above``: the folders that lead here, resolved, this one too."""
+    seen = sorted((each for each in folder.iterdir() if not each.name.startswith(".")), key=in_order)
+    files = _without_twins([each for each in seen if each.name.endswith(SUFFIXES) and each.is_file()], folder)
     if (folder / METADATA).exists() or (len(files) > 1 and _is_one(folder, files)):
         return [folder]
-    inner = (each for each in folder.iterdir() if each.is_dir() and not each.name.startswith("."))
-    within = [log for each in sorted(inner, key=in_order) for log in logs_in(each)]
-    return [*(each for each in files if not each.name.startswith(".")), *within]
+    within = [
+        log
+        for each in seen
+        if each.is_dir() and not _leads_up(place := each.resolve(), above)
+        for log in _logs_in(each, (*above, place))
+    ]
+    return [*files, *within]
+
+
+def _leads_up(place: Path, above: Sequence[Path]) -> bool:
+    return any(folder.is_relative_to(place) for folder in above)
+
+
+def _without_twins(paths: Sequence[Path], folder: Path) -> list[Path]:
+    """The same without what is found twice, or in a log that is a folder: the way without a link stays."""
+    root = folder.resolve()
+    places = {path: path.resolve() for path in paths}
+    taken: dict[Path, Path] = {}
+    for path in sorted(paths, key=lambda path: places[path] != root / path.relative_to(folder)):
+        if taken.keys().isdisjoint((places[path], *places[path].parents)):
+            taken[places[path]] = path
+    return [path for path in paths if taken.get(places[path]) == path]
 
 
 def is_folder_of_logs(path: Path) -> bool:

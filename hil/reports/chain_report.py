@@ -24,6 +24,7 @@ from hil.reports.notation import written
 from hil.reports.page import Section, Timeline, page, table_html
 from hil.reports.plots import Key, Panel, TimeAxis, draw_level, draw_line, hover, limits_around, table
 from hil.reports.provenance import provenance_html
+from hil.reports.reasons import judged_html
 from hil.reports.track_plot import Robot, tracks
 from hil.scenario.parts import station
 from hil.scenario.schema import Scenario
@@ -78,7 +79,8 @@ def _verdict(summary: Mapping[str, Any]) -> str:
     style = "bad" if wrong else "warn" if doubtful else "good"
     says = "; ".join(told) or "Nothing speaks against the run"
     linked = '<p><a href="#followers">What each follower did</a></p>'
-    return f'<div class="verdict {style}"><p><strong>{escape(says)}.</strong></p>{linked}</div>\n'
+    told_by = judged_html(*pairs)
+    return f'<div class="verdict {style}"><p><strong>{escape(says)}.</strong></p>{told_by}{linked}</div>\n'
 
 
 def _followers(summary: Mapping[str, Any]) -> str:

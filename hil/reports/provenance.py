@@ -11,6 +11,7 @@ from typing import Any
 from hil.errors import UsageError
 from hil.judge.made_by import made_by
 from hil.judge.run_data import RunData
+from hil.judge.summary_text import judged_by
 from hil.log.metadata import IMPORT, LIVE
 from hil.log.older_keys import with_older_keys
 from hil.log.origin import Origin
@@ -45,8 +46,8 @@ def _facts(run_data: RunData, summary: Mapping[str, Any]) -> Iterator[tuple[str,
     if "seed" in summary:
         what.append(f"seed {summary['seed']}")
     yield "what", ", ".join([*what, str(summary["mode"]), f"{summary['duration_s']:.1f} s"])
-    if summary.get("truth") == "mocap":
-        yield "judged by", "the smoothed mocap tracks, whose own errors are in all that is told of errors"
+    if judged := judged_by(summary):
+        yield "judged", judged.partition(",")[0]
     told = {
         "abreast": origin.version,
         "begun": origin.begun,

@@ -8,7 +8,7 @@ from html import escape
 from typing import Any
 
 from hil.judge.certified import certified_violations
-from hil.judge.summary_text import extended_violations, parity_line, warnings_by_part
+from hil.judge.summary_text import extended_violations, judged_by, parity_line, warnings_by_part
 from hil.reports.notation import written
 
 GOOD, WARN, BAD, PLAIN = "good", "warn", "bad", "soft"
@@ -60,7 +60,7 @@ def reasons_of(summary: Mapping[str, Any]) -> list[Reason]:
 
 
 def verdict_html(summary: Mapping[str, Any]) -> str:
-    """The sentence, and the reasons below it."""
+    """The sentence, what the run is judged by where that is not the truth, and the reasons below."""
     reasons = reasons_of(summary)
     style, sentence = _verdict(reasons)
     rows = "".join(
@@ -70,9 +70,16 @@ def verdict_html(summary: Mapping[str, Any]) -> str:
         for reason in reasons
     )
     return (
-        f'<div class="verdict {style}"><p><strong>{escape(sentence)}</strong></p></div>\n'
+        f'<div class="verdict {style}"><p><strong>{escape(sentence)}</strong></p>'
+        f"{judged_html(summary)}</div>\n"
         f'<ul class="reasons">{rows}</ul>\n'
     )
+
+
+def judged_html(*summaries: Mapping[str, Any]) -> str:
+    """What runs are judged by where that is not the truth, for under their verdict."""
+    judged = dict.fromkeys(filter(None, map(judged_by, summaries)))
+    return "".join(f'<p class="soft">Judged {escape(each)}.</p>' for each in judged)
 
 
 def warnings_html(summary: Mapping[str, Any], part: str) -> str:

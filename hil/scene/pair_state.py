@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from estimation.tracking.tracker import Status
 from formation.mount import robot_pose
@@ -22,6 +24,23 @@ from hil.wire.records import Placement
 from hil.wire.topics import link_topics
 
 _KEPT = 128
+
+_FRESH_NS = 1_000_000_000
+"""What was heard longer ago is not shown: whoever told it may be gone."""
+
+Told = TypeVar("Told")
+
+
+@dataclass(frozen=True, slots=True)
+class Heard(Generic[Told]):
+    """What was told, and when it was heard [ns]."""
+
+    told: Told
+    at_ns: int
+
+    def still(self, now_ns: int) -> Told | None:
+        """The same, None once it is stale; also after time has jumped back."""
+        return self.told if abs(now_ns - self.at_ns) <= _FRESH_NS else None
 
 
 class PairState:
@@ -43,8 +62,8 @@ class PairState:
         self._mounts = (leader_mount(scenario), follower_mount(scenario))
         self._station = station(scenario)
         self._sigma_position = pose_noise(scenario).position
-        self._estimate: msg.LeaderEstimate | None = None
-        self._command: msg.Command | None = None
+        self._estimate: Heard[msg.LeaderEstimate] | None = None
+        self._command: Heard[msg.Command] | None = None
         self._headings: dict[int, float] = {}
         self._framed = False
 
@@ -62,13 +81,20 @@ class PairState:
                 self._headings.pop(next(iter(self._headings)))
         return found
 
-    def note(self, topic: str, payload: bytes) -> dict[str, Pose]:
-        """Take in what else is heard; where robots stand by that, where no frame tells it."""
+    def note(self, topic: str, payload: bytes, now_ns: int) -> dict[str, Pose]:
+        """Take in what else is heard; where robots stand by that, where no frame tells it.
+
+        Raises ValueError, or :class:`MalformedPayloadError`, for what is no such message, and keeps none.
+        """
         names = self._names
         if topic == names.estimate:
-            self._estimate = decode_as(payload, msg.LeaderEstimate)
+            estimate = decode_as(payload, msg.LeaderEstimate)
+            # Neither fails again where it is drawn.
+            Status(estimate.status)
+            to_ns(estimate.header.stamp)
+            self._estimate = Heard(estimate, now_ns)
         elif topic == names.command:
-            self._command = decode_as(payload, msg.Command)
+            self._command = Heard(decode_as(payload, msg.Command), now_ns)
         elif topic == topics.DIAGNOSTICS:
             self._note_report(decode_as(payload, msg.DiagnosticArray))
         elif topic == names.odom and not self._framed and self._estimate is not None:
@@ -76,7 +102,7 @@ class PairState:
             odometry = decode_as(payload, msg.Odometry)
             (place,) = places_of(odometry)
             pose = _pose_of(place.place)
-            return {} if pose is None else {self.link.follower: pose, **self._led_from(pose)}
+            return {} if pose is None else {self.link.follower: pose, **self._led_from(pose, now_ns)}
         return {}
 
     def _note_report(self, report: msg.DiagnosticArray) -> None:
@@ -87,14 +113,15 @@ class PairState:
         if (side := controller.get("side")) is not None:
             self._station = Station(Side(side), self.link.scenario.formation.bearing)
 
-    def _led_from(self, follower: Pose) -> dict[str, Pose]:
+    def _led_from(self, follower: Pose, now_ns: int) -> dict[str, Pose]:
         """Where the leader stands by the estimate, seen from the follower."""
-        told = self._estimate
+        told = _still(self._estimate, now_ns)
         if told is None or not math.isfinite(told.rho + told.alpha2 + told.alpha1):
             return {}
         line = follower.theta + told.alpha2
         at = follower.x + told.rho * math.cos(line), follower.y + told.rho * math.sin(line)
-        return {self.link.leader: Pose(*at, line + math.pi - told.alpha1)}
+        pose = Pose(*at, line + math.pi - told.alpha1)
+        return {self.link.leader: pose} if all(map(math.isfinite, pose)) else {}
 
     def seen(self, now_ns: int, stands: Mapping[str, Pose]) -> SeenPair | None:
         """What there is to draw of the pair, None before both have been seen."""
@@ -102,7 +129,7 @@ class PairState:
         if not stands.keys() >= set(names):
             return None
         leader, follower = (stands[name] for name in names)
-        command = self._command
+        command = _still(self._command, now_ns)
         return SeenPair(
             now_ns,
             names,
@@ -110,22 +137,25 @@ class PairState:
             follower,
             self.link.scenario.formation.rho_0,
             self._station,
-            self._believed(follower),
+            self._believed(follower, now_ns),
             None if command is None else (command.v2, command.u2),
             "" if command is None else command.stop,
         )
 
-    def _believed(self, follower: Pose) -> Believed | None:
-        told = self._estimate
+    def _believed(self, follower: Pose, now_ns: int) -> Believed | None:
+        told = _still(self._estimate, now_ns)
         if told is None or not math.isfinite(told.rho + told.alpha2 + told.alpha1 + told.v1):
             return None
         # The heading of its very capture: the robot has turned since.
         heading = self._headings.get(to_ns(told.header.stamp), follower.theta)
+        theta = heading + told.alpha2 + math.pi - told.alpha1
+        if not math.isfinite(theta):
+            return None
         variances = told.covariance[::6]
         status = Status(told.status)
         along, across = self._position_sds(told)
         return Believed(
-            theta=heading + told.alpha2 + math.pi - told.alpha1,
+            theta=theta,
             alpha1=told.alpha1,
             v1=told.v1,
             sd_v1=math.sqrt(max(0.0, float(variances[2]))),
@@ -143,6 +173,10 @@ class PairState:
         if given.front_end == "body":
             return given.sigma_range, given.sigma_bearing * told.rho
         return self._sigma_position, self._sigma_position
+
+
+def _still(heard: Heard[Told] | None, now_ns: int) -> Told | None:
+    return None if heard is None else heard.still(now_ns)
 
 
 def _pose_of(place: Placement) -> Pose | None:

@@ -87,3 +87,44 @@ def test_a_file_for_viewers_is_not_written_over(
     assert "--overwrite" in err
     code, out, _ = said(capsys, *arguments, "--overwrite", "--json")
     assert json.loads(out)["messages"]["/truth"] == short_log.counts["truth"]
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("columns.csv", ["--format", "csv"]),
+        ("foxglove.json", ["--format", "foxglove"]),
+        ("plotjuggler.xml", ["--format", "foxglove"]),
+    ],
+)
+def test_nothing_in_the_folder_is_written_over_unasked(
+    short_log: Log,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    name: str,
+    arguments: list[str],
+) -> None:
+    (tmp_path / name).write_text("of mine")
+    code, out, err = said(capsys, short_log.path, "--to", tmp_path, *arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert name in err
+    assert [each.name for each in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text() == "of mine"
+
+
+def test_layouts_are_not_written_over_unasked(
+    short_log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    layout = tmp_path / "plotjuggler.xml"
+    layout.write_text("of mine")
+    for arguments in ([], [short_log.path, "--to", tmp_path / "out"]):
+        code, out, err = said(capsys, *arguments, "--layouts", tmp_path)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert layout.read_text() == "of mine"
+    assert not (tmp_path / "out").exists()
+    code, _, _ = said(capsys, "--layouts", tmp_path, "--overwrite")
+    assert code == 0
+    assert layout.read_text() != "of mine"
+    both = tmp_path / "both"
+    code, _, err = said(capsys, short_log.path, "--to", both, "--format", "foxglove", "--layouts", both)
+    assert (code, err) == (0, "")

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 import re
 from collections.abc import Iterator
@@ -15,11 +16,13 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from hil.exports.foxglove_export import export_foxglove
+from hil.exports.foxglove_file import Made, write_foxglove
 from hil.exports.layouts import LAYOUTS, write_layouts
 from hil.judge.replayed import ReplayChoice
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import Log, read_log
 from hil.log.writer import LogWriter
+from hil.nodes.node import Outgoing
 from hil.scenario.files import load_scenario
 from hil.scenario.links import links_of
 
@@ -202,3 +205,13 @@ def test_estimates_made_anew_take_the_place_of_those_of_the_log(
     )
     assert len(before) == len(anew)
     assert before != anew
+
+
+def test_what_was_made_after_the_logs_last_message_is_there_too(short_log: Log, tmp_path: Path) -> None:
+    scenario, topic = load_scenario("turtlebot3"), "follower/leader_estimate"
+    (first,) = itertools.islice(short_log.records([topic]), 1)
+    after_ns = (short_log.end_ns or 0) + 1_000_000
+    late = [Outgoing(topic, first.typename, first.payload, after_ns + number) for number in range(3)]
+    done = write_foxglove(short_log, scenario, tmp_path / "seen.mcap", Made(late, frozenset({topic})))
+    assert done.messages[f"/{topic}"] == len(late)
+    assert sum(name == f"/{topic}" for name, _ in decoded(tmp_path / "seen.mcap")) == len(late)

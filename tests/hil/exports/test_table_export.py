@@ -14,7 +14,8 @@ from pyarrow import parquet
 from estimation.tracking.tracker import Status
 from hil.errors import UsageError
 from hil.exports.aligned_columns import ALIGNED_COLUMNS
-from hil.exports.table_export import export_tables, refuse_present
+from hil.exports.refusal import refuse_present
+from hil.exports.table_export import TABLES, export_tables
 from hil.judge.columns import columns_of
 from hil.judge.estimation import errors_at
 from hil.judge.replayed import ReplayChoice
@@ -170,5 +171,5 @@ def test_of_a_damaged_log_what_is_whole_is_written(short_log: Log, tmp_path: Pat
 
 def test_what_lies_there_is_not_written_over(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="--overwrite"):
-        refuse_present(folder)
-    refuse_present(tmp_path)
+        refuse_present(folder, TABLES)
+    refuse_present(tmp_path, TABLES)

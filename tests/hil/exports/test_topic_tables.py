@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,16 @@ import polars as pl
 import pytest
 from mcap.writer import Writer
 
+from hil.exports.table_file import Format
 from hil.exports.topic_tables import comments_of, topic_paths, write_topics
 from hil.log.reader import Log, read_log
 from hil.log.writer import LogWriter
+from hil.log.written_aside import write_text_aside
 from hil.wire.message_types import Message, Odometry, RigidBodies
 from hil.wire.messages import definition, encode, typename_of
+
+LONG = "\u8def" * 400
+FORMS: tuple[Format, ...] = ("csv", "parquet")
 
 
 @pytest.fixture(scope="module")
@@ -85,6 +91,29 @@ def test_no_topic_leads_out_of_the_folder() -> None:
     for path in paths.values():
         assert not Path(path).is_absolute()
         assert not {"..", "."} & set(Path(path).parts)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(
+    "topics",
+    [
+        ["a", "a.FORM/b", "a.FORM/c", "a.FORM"],
+        ["a.FORM/b", "a", "a-2"],
+        ["a.FORM/b/c", "a.FORM/b", "a", "a-2.FORM/x"],
+        [LONG, LONG + "x", LONG + "/x", "x" * 178 + LONG, "x" * 179 + LONG, "\ud800", "." * 300],
+    ],
+    ids=["a file first", "a folder first", "deep", "long"],
+)
+def test_every_topic_gets_a_file_that_can_be_made(tmp_path: Path, topics: list[str], form: Format) -> None:
+    """By making them all."""
+    paths = topic_paths(dict.fromkeys([each.replace("FORM", form) for each in topics], ""), form)
+    for path in paths.values():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        write_text_aside(tmp_path / path, "")
+        for part in Path(path).parts:
+            assert len(part.encode()) <= 200
+            assert not re.search("%(?![0-9A-F]{2})", part)
+    assert len({*paths.values()}) == len(topics)
 
 
 def test_comments_are_found_beside_their_fields() -> None:

@@ -106,8 +106,10 @@ def test_it_is_marked_wherever_a_person_looks(both: tuple[RunData, RunData]) -> 
         line[:2] for line in verdict_lines(summary)
     ]
     page = run_report(PlotData.of(real), summary)
-    assert "by the smoothed mocap tracks" in page
-    assert "smoothed mocap" in page
+    top, _, parts = page.partition("<main>")
+    assert "Judged by the smoothed mocap tracks, whose own errors are in what follows." in top
+    assert "<dt>judged</dt><dd>by the smoothed mocap tracks</dd>" in parts
+    assert "</span>smoothed mocap</li>" in parts, "the legend of the plots"
     assert "smoothed mocap" not in run_report(PlotData.of(known), summarise(known))
 
 

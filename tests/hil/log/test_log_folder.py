@@ -87,3 +87,29 @@ def test_a_file_and_a_folder_with_a_single_one_are_no_folders_of_logs(tmp_path: 
     assert not is_folder_of_logs(tmp_path)
     (tmp_path / "empty").mkdir()
     assert not is_folder_of_logs(tmp_path / "empty")
+
+
+def test_a_link_to_what_is_found_anyway_is_no_second_log(tmp_path: Path) -> None:
+    folder, elsewhere = tmp_path / "runs", tmp_path / "elsewhere"
+    for each in (folder / "run_3", folder / "zone", elsewhere / "far"):
+        each.mkdir(parents=True)
+    runs = [ours(each / "run.mcap") for each in (folder, folder / "run_3")]
+    ours(elsewhere / "far" / "run.mcap")
+    (folder / "latest").symlink_to("run_3")
+    (folder / "latest.mcap").symlink_to(folder / "run_3" / "run.mcap")
+    (folder / "zone" / "top").symlink_to(folder)
+    (folder / "zone" / "up").symlink_to(tmp_path)
+    (folder / "far").symlink_to(elsewhere / "far")
+    (folder / "far_too").symlink_to(elsewhere / "far")
+    assert logs_in(folder) == [runs[0], folder / "far" / "run.mcap", runs[1]]
+    assert logs_in(folder / "latest") == [folder / "latest" / "run.mcap"], "asked for by the link itself"
+
+
+def test_a_link_to_a_piece_makes_pieces_no_logs_of_their_own(tmp_path: Path) -> None:
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    for n in range(2):
+        strangers(bag / f"bag_{n}.mcap", 100 * n, 100 * n + 1)
+    (bag / "newest.mcap").symlink_to("bag_1.mcap")
+    (tmp_path / "newest.mcap").symlink_to(bag / "bag_1.mcap")
+    assert logs_in(tmp_path) == [bag]

@@ -82,3 +82,13 @@ def test_without_truth_there_is_no_picture_but_what_each_did(
     page = chain_report(scenario, runs, None, summary)
     assert not re.search(r"<figure", page)
     assert "Followers" in words(page)
+
+
+def test_a_chain_of_real_robots_says_under_its_verdict_what_it_is_judged_by(
+    driven: tuple[Scenario, list[RunData], dict[str, Any]],
+) -> None:
+    scenario, runs, summary = driven
+    assert "Judged" not in chain_report(scenario, runs, None, summary)
+    real = summary | {"pairs": [pair | {"truth": "mocap"} for pair in summary["pairs"]]}
+    top = chain_report(scenario, runs, None, real).partition("<main>")[0]
+    assert top.count("Judged by the smoothed mocap tracks") == 1

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterable
 from typing import Any
@@ -16,6 +17,7 @@ from hil.scene.markers import Marker, MarkerArray
 from hil.scene.robot_size import HEIGHT, WIDTH
 from hil.wire.message_types import (
     Command,
+    Header,
     LeaderEstimate,
     Message,
     Odometry,
@@ -24,6 +26,7 @@ from hil.wire.message_types import (
     Quaternion,
     RigidBodies,
     RigidBody,
+    Time,
     Twist,
     TwistWithCovariance,
     Vector3,
@@ -52,6 +55,14 @@ def frame(leader: Pose = LEADS, follower: Pose = FOLLOWS) -> RigidBodies:
     return RigidBodies(header(NOW, "mocap"), 1, bodies)
 
 
+ODOMETRY = Odometry(
+    header=header(NOW, "odom"),
+    child_frame_id="base",
+    pose=PoseWithCovariance(pose=placed(FOLLOWS), covariance=np.zeros(36)),
+    twist=TwistWithCovariance(twist=STILL, covariance=np.zeros(36)),
+)
+
+
 def estimate(**changes: object) -> LeaderEstimate:
     told = {
         "rho": SHAPE.rho, "alpha2": SHAPE.alpha2, "rho_dot": 0.0, "alpha2_dot": 0.0, "v1": 0.1,
@@ -68,10 +79,10 @@ def command(stop: str = "") -> Command:
 
 
 def shown(messages: Iterable[tuple[str, Message]], *settings: str) -> tuple[TFMessage, list[Marker]]:
-    """What is shown at last of messages that come one second apart."""
+    """What is shown at last of messages that come a tenth of a second apart."""
     scene, told = LabScene(load_scenario("turtlebot3", settings)), dict[str, Outgoing]()
     for number, (topic, message) in enumerate(messages):
-        told |= {each.topic: each for each in scene.hear(topic, encode(message), NOW + number * 10**9)}
+        told |= {each.topic: each for each in scene.hear(topic, encode(message), NOW + number * 10**8)}
     transforms, markers = decode_as(told[TF].payload, TFMessage), decode_as(told[SCENE].payload, MarkerArray)
     found: list[Any] = list(markers.markers)
     return transforms, found
@@ -165,13 +176,7 @@ def test_what_is_not_trusted_is_not_drawn() -> None:
 
 
 def test_without_motion_capture_the_leader_is_where_the_estimate_has_it_from_the_odometry() -> None:
-    odometry = Odometry(
-        header=header(NOW, "odom"),
-        child_frame_id="base",
-        pose=PoseWithCovariance(pose=placed(FOLLOWS), covariance=np.zeros(36)),
-        twist=TwistWithCovariance(twist=STILL, covariance=np.zeros(36)),
-    )
-    transforms, _ = shown([("follower/leader_estimate", estimate()), ("follower/odom", odometry)])
+    transforms, _ = shown([("follower/leader_estimate", estimate()), ("follower/odom", ODOMETRY)])
     at = {each.child_frame_id: each.transform for each in transforms.transforms}["leader"]
     assert (at.translation.x, at.translation.y) == pytest.approx(LEADS[:2])
     assert 2.0 * math.atan2(at.rotation.z, at.rotation.w) % math.tau == pytest.approx(LEADS.theta)
@@ -192,3 +197,41 @@ def test_it_is_told_as_often_as_eyes_can_follow_and_again_after_a_jump_back() ->
 @pytest.mark.parametrize("topic", ["rigid_bodies", "follower/leader_estimate", "diagnostics", "elsewhere"])
 def test_what_cannot_be_read_is_passed_over(topic: str) -> None:
     assert not list(LabScene(load_scenario("turtlebot3")).hear(topic, b"\0\1\0\0nothing", NOW))
+
+
+@pytest.mark.parametrize("field", ["status", "stamp"])
+def test_an_estimate_that_is_none_is_passed_over_and_not_kept(field: str) -> None:
+    odd = estimate(status=200) if field == "status" else estimate()
+    if field == "stamp":
+        odd = dataclasses.replace(odd, header=Header(Time(sec=-1, nanosec=0), "follower"))
+    odd_ones: list[tuple[str, Message]] = [("follower/leader_estimate", odd), ("rigid_bodies", frame())]
+    _, markers = shown([*EVERYTHING, *odd_ones])
+    assert "tracking" in of(markers, 20).text, "by the estimate before"
+
+
+@pytest.mark.parametrize("framed", [True, False])
+def test_angles_that_are_none_are_not_drawn(framed: bool) -> None:
+    wild = ("follower/leader_estimate", estimate(alpha2=1.7e308, alpha1=-1.7e308))
+    place: tuple[str, Message] = ("rigid_bodies", frame()) if framed else ("follower/odom", ODOMETRY)
+    transforms, markers = shown([wild, place])
+    assert {each.child_frame_id for each in transforms.transforms} == (
+        {"leader", "follower"} if framed else {"follower"}
+    )
+    assert 20 not in {each.id for each in markers}
+
+
+def test_a_robot_that_the_motion_capture_has_lost_is_shown_no_longer() -> None:
+    alone = RigidBodies(header(NOW, "mocap"), 1, frame().rigidbodies[1:])
+    later: list[tuple[str, Message]] = [("rigid_bodies", alone)] * 12
+    transforms, markers = shown([*EVERYTHING, *later[:7]])
+    assert {each.child_frame_id for each in transforms.transforms} == {"leader", "follower"}
+    transforms, markers = shown([*EVERYTHING, *later])
+    assert [each.child_frame_id for each in transforms.transforms] == ["follower"]
+    assert {each.header.frame_id for each in markers} == {"follower"}
+
+
+def test_an_estimate_and_a_command_of_nodes_that_are_gone_are_shown_no_longer() -> None:
+    later: list[tuple[str, Message]] = [("rigid_bodies", frame())] * 12
+    _, markers = shown([*EVERYTHING[:2], ("follower/command", command("no estimate")), *later])
+    assert {each.id for each in markers if each.ns == "follower/estimate"} == {0, 21}
+    assert "no estimate" not in of(markers, 21).text
