@@ -15,6 +15,7 @@ from tornado.iostream import StreamClosedError
 from tornado.web import Application, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
+from hil.live_page.bounded_server import BoundedServer
 from hil.live_page.browser_words import (
     LARGEST_WORDS,
     Hello,
@@ -240,11 +241,12 @@ def http_server(page: LivePage) -> HTTPServer:
         websocket_ping_interval=_LOST_S / 2,
         websocket_ping_timeout=_LOST_S / 2,
     )
-    return HTTPServer(
+    return BoundedServer(
         application,
+        refuse=lambda: page.admission.refuse("too many connections"),
         max_header_size=16_384,
         max_body_size=2 * LARGEST_WORDS,
         max_buffer_size=1 << 20,
         body_timeout=_HELLO_S,
-        idle_connection_timeout=60.0,
+        idle_connection_timeout=_LOST_S,
     )
