@@ -35,6 +35,7 @@ def command(
     with joined(endpoints, chosen, "stop", patience=3.0) as wire:
         stopped = stop_all(wire, chosen, reason)
     if not stopped.done:
-        note(f"abreast stop: {stopped.line()}")
+        other = "; are these not your robots, give --scenario FILE of your lab, and see that its bridge runs"
+        note(f"abreast stop: {stopped.line()}{other if stopped.unheard else ''}")
         sys.exit(1)
     say(stopped.line())

@@ -17,18 +17,15 @@ class BrowserPace:
     """
 
     link_s: float = 0.0
-    sent: int = 0
     _unseen: deque[tuple[int, float]] = field(default_factory=deque)
 
     def may_send(self) -> bool:
         """Whether it has seen enough of what it was sent."""
         return len(self._unseen) < _MOST_UNSEEN
 
-    def send(self, now: float) -> int:
-        """The number of a frame that is sent now."""
-        self.sent += 1
-        self._unseen.append((self.sent, now))
-        return self.sent
+    def send(self, number: int, now: float) -> None:
+        """A frame is sent now, of a higher number than all before."""
+        self._unseen.append((number, now))
 
     def see(self, number: int, now: float) -> None:
         """It says that it has seen a frame, and so all before it."""

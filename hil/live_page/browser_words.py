@@ -37,14 +37,16 @@ class Stop(msgspec.Struct, frozen=True, tag="stop", tag_field="say", forbid_unkn
 
 
 class Arm(msgspec.Struct, frozen=True, tag="arm", tag_field="say", forbid_unknown_fields=True):
-    """A robot may be driven again, by its name; all of them, by none."""
+    """A robot may be driven again, by its name; all of them, by none. ``frame``: the last that was seen."""
 
+    frame: _Count
     robot: _Text = ""
 
 
 class ChangeSide(msgspec.Struct, frozen=True, tag="side", tag_field="say", forbid_unknown_fields=True):
-    """The follower is to go to a side of its leader."""
+    """The follower is to go to a side of its leader. ``frame``: the last that was seen."""
 
+    frame: _Count
     side: Literal["left", "right"]
 
 

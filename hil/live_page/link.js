@@ -11,6 +11,7 @@ export class Link {
     this.socket = null;
     this.token = "";
     this.last = 0;
+    this.frame = 0;
     this.waiting = [];
     this.ended = false;
     addEventListener("hashchange", () => this.socket ? this.socket.close() : this.connect());
@@ -51,8 +52,10 @@ export class Link {
       if (said.kind === "bye") this.ended = true;
       if (said.kind === "config") {
         this.ended = false;
+        this.frame = 0;
         this.changed(true, "");
       }
+      if (said.kind === "frame") this.frame = said.n;
       if (said.kind === "answer") this.answered(said);
       this.heard(said);
     };
@@ -76,7 +79,9 @@ export class Link {
   }
 
   // Gives an order, and what the server says to it. A stop that the websocket does not bring over at once is posted.
+  // Any other says by which frame it was given: one that is stuck on its way is not to be heeded after a stop.
   async order(word) {
+    if (word.say !== "stop") word = { ...word, frame: this.frame };
     const said = this.say(word), heard = said ? this.answer(word.say) : never;
     const lost = { given: false, lost: true, text: "the server is not reached" };
     const first = said && await Promise.race([heard, after(word.say === "stop" ? ANSWER_MS : POST_MS, null)]);

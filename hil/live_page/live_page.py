@@ -7,19 +7,21 @@ import json
 import secrets
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from typing import Any
 
 import zenoh
 
 from hil import __version__
-from hil.live.stopping import Stopped
 from hil.live_page.admission import Admission
 from hil.live_page.browser_pace import BrowserPace
 from hil.live_page.browser_words import Arm, Order, Stop
 from hil.live_page.orbit import orbit_of
-from hil.live_page.order_line import OrderLine
+from hil.live_page.order_line import TOLD_TO_STOP, OrderLine
+from hil.live_page.seen_frames import SeenFrames
 from hil.live_page.shown_lab import ShownLab
 from hil.scenario.schema import Scenario
+from hil.wire import topics
 from hil.wire.key_layout import layout_of
 from hil.wire.newest import Newest
 
@@ -31,6 +33,9 @@ _MOST_FAILURES = 20
 _REPORT_S = 0.5
 _LINGER_S = 5.0
 """For so long [s] the lab is listened to after the last browser left: a page may be loaded anew."""
+
+_TELL_S = 1.5
+"""Within this time [s] an order is said, or else its browser is told that it may not have been."""
 
 Send = Callable[[str], None]
 
@@ -62,6 +67,7 @@ class LivePage:
         self._orders = OrderLine(session, scenario, allowed, self._told_from_thread)
         self._newest: Newest | None = None
         self._viewers: list[Viewer] = []
+        self._frames = SeenFrames()
         self._number = secrets.token_hex(4)
         self._clock = time.monotonic
         self._failures: set[str] = set()
@@ -103,19 +109,25 @@ class LivePage:
 
     async def order(self, wanted: Order) -> tuple[bool, str]:
         """Give an order: whether it was given, and in words what was."""
+        if isinstance(wanted, Stop):
+            self._frames.note_stop()
         if not self._orders.has_link:
             return False, "the lab's router is not reached: nothing was told; use the robot's switch"
         if isinstance(wanted, Stop):
             if not self._orders.may_stop:
                 return False, "our keys do not let us stop anybody; use the robot's switch"
-            await asyncio.wrap_future(self._orders.stop())
-            return True, "everybody is told to stop"
-        text = self._orders.order(wanted)
-        return text.startswith("told "), text
+            given, text = await _said(self._orders.stop(), TOLD_TO_STOP)
+            return given, text if given else f"{text}; use the robot's switch"
+        if refusal := self._frames.refusal(wanted.frame, self._clock()):
+            return False, refusal
+        said, text = self._orders.order(wanted)
+        return (False, text) if said is None else await _said(said, text)
 
     def go_round(self) -> None:
         """Take in what has come, and send it to the browsers that keep up; to be called every FRAME_S."""
         now = self._clock()
+        for viewer in [each for each in self._viewers if each.pace.is_gone(now)]:
+            self._dismiss(viewer)
         if self._newest is None:
             return
         if not self._viewers:
@@ -124,13 +136,13 @@ class LivePage:
                 self._newest = None
             return
         for event in self._newest.take():
+            if event.topic == topics.STOP:
+                self._frames.note_stop()
             self._lab.hear(event, now)
+        number = self._frames.next(now)
         motions: dict[int, dict[str, Any]] = {}
         reports: dict[str, Any] | None = None
         for viewer in list(self._viewers):
-            if viewer.pace.is_gone(now):
-                viewer.leave()
-                continue
             if not viewer.pace.may_send():
                 continue
             if viewer.follower not in motions:
@@ -141,13 +153,14 @@ class LivePage:
                 viewer.reported_at = now
                 reports = reports or self._reports(now)
                 frame["reports"] = reports
-            viewer.send(_json({"n": viewer.pace.send(now), **frame}))
+            viewer.pace.send(number, now)
+            viewer.send(_json({"n": number, **frame}))
 
     def close(self) -> None:
         """Say good-bye to all browsers, and listen no more."""
         for viewer in list(self._viewers):
             viewer.send(_json({"kind": "bye"}))
-            viewer.leave()
+            self._dismiss(viewer)
         if self._newest is not None:
             self._newest.close()
             self._newest = None
@@ -176,19 +189,36 @@ class LivePage:
             "refused": dict(self.admission.refused),
         }
 
-    def _told_from_thread(self, stopped: Stopped | None) -> None:
-        self._loop.call_soon_threadsafe(self._tell, stopped)
+    def _dismiss(self, viewer: Viewer) -> None:
+        """Hang up; it counts no longer, whenever its connection ends."""
+        self.go(viewer)
+        viewer.leave()
 
-    def _tell(self, stopped: Stopped | None) -> None:
+    def _told_from_thread(self, state: str, text: str) -> None:
+        self._loop.call_soon_threadsafe(self._tell, state, text)
+
+    def _tell(self, state: str, text: str) -> None:
         """Tell all browsers of a stop, whoever asked for it."""
-        news: dict[str, Any] = {"kind": "stop", "state": "told", "text": "everybody is told to stop"}
-        if stopped is not None:
-            news |= {"state": "done" if stopped.done else "failed", "text": stopped.line()}
         for viewer in list(self._viewers):
-            viewer.send(_json(news))
+            viewer.send(_json({"kind": "stop", "state": state, "text": text}))
 
     async def _find_orbit(self) -> None:
         self._lab.orbit = await asyncio.to_thread(orbit_of, self._scenario)
+
+
+async def _said(telling: Future[None], text: str) -> tuple[bool, str]:
+    """Whether an order was said in time, and in words what was, or why it was not."""
+    said = asyncio.wrap_future(telling)
+    # A failure that comes too late to be told is no news.
+    said.add_done_callback(lambda late: late.cancelled() or late.exception())
+    await asyncio.wait({said}, timeout=_TELL_S)
+    if not said.done():
+        taken_back = telling.cancel()
+        return False, "not told in time, and taken back" if taken_back else "not known whether it was told"
+    if said.cancelled():
+        return False, "not told: a stop came first"
+    error = said.exception()
+    return (True, text) if error is None else (False, f"not told: {error}")
 
 
 def answer(order: Order, given: bool, text: str) -> str:

@@ -9,7 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import zenoh
 
-from hil.live.stopping import REPEAT_S, TIMES, Stopped, may_stop, say_stop, stop_all
+from hil.live.stopping import REPEAT_S, TIMES, may_stop, say_stop, stop_all
 from hil.live_page.browser_words import Arm, ChangeSide
 from hil.scenario.schema import Scenario
 from hil.wire import topics
@@ -21,24 +21,26 @@ from hil.wire.pubsub import Wire
 from hil.wire.topics import topics_of, urgent_topics
 
 REASON = "stopped by hand on the live page"
+TOLD_TO_STOP = "everybody is told to stop"
+
+Told = Callable[[str, str], None]
 
 
 class OrderLine:
     """Gives orders from threads of its own, as Zenoh may keep one waiting that gives them.
 
-    ``told``: called in such a thread when a stop was said, with None, and when it is known what came of it.
+    Stops have threads that nothing else can fill; any other order waits for the one before it.
+    ``told``: called in such a thread with the state of a stop and its words: ``told`` when it was said, and
+    ``done`` or ``failed`` when it is known what came of it, or that this cannot be known.
     """
 
     def __init__(
-        self,
-        session: zenoh.Session,
-        scenario: Scenario,
-        allowed: frozenset[str] | None,
-        told: Callable[[Stopped | None], None],
+        self, session: zenoh.Session, scenario: Scenario, allowed: frozenset[str] | None, told: Told
     ) -> None:
         self._session, self._scenario, self._allowed, self._told = session, scenario, allowed, told
         self._names = {robot.name for robot in robots_of(scenario)}
-        self._threads = ThreadPoolExecutor(4, "order")
+        self._stops, self._others = ThreadPoolExecutor(4, "stop"), ThreadPoolExecutor(1, "order")
+        self._waiting: set[Future[None]] = set()
         self._watching, self._repeating = threading.Lock(), threading.Lock()
         self._wire = self._new_wire()
 
@@ -53,38 +55,49 @@ class OrderLine:
         return bool(self._session.info.links())
 
     def stop(self) -> Future[None]:
-        """Stop everybody; done when that was said for the first time, and what comes of it is told."""
+        """Stop everybody; done when that was said for the first time, and what comes of it is told.
+
+        Orders that wait are dropped.
+        """
+        for each in list(self._waiting):
+            each.cancel()
         said: Future[None] = Future()
-        self._threads.submit(self._stop, said)
+        # From here on nobody takes it back.
+        said.set_running_or_notify_cancel()
+        self._stops.submit(self._stop, said)
         return said
 
-    def order(self, wanted: Arm | ChangeSide) -> str:
-        """Give another order; in words what was said, or why nothing was."""
+    def order(self, wanted: Arm | ChangeSide) -> tuple[Future[None] | None, str]:
+        """Give another order: what is done when it was said, and its words; None, and why it is not given."""
         if isinstance(wanted, Arm):
             if wanted.robot and wanted.robot not in self._names:
-                return f"there is no robot {wanted.robot!r}"
+                return None, f"there is no robot {wanted.robot!r}"
             topic, word, text = topics.ARM, wanted.robot, f"told {wanted.robot or 'all'} to be armed"
         else:
             topic, word = topics_of(self._scenario).side, wanted.side
             text = f"told the follower to go to the {word}"
         if not self._wire.may_publish(topic):
-            return "our keys do not let us give this order"
-        self._threads.submit(self._wire.publish, topic, encode(String(data=word)))
-        return text
+            return None, "our keys do not let us give this order"
+        said = self._others.submit(self._wire.publish, topic, encode(String(data=word)))
+        self._waiting.add(said)
+        said.add_done_callback(self._waiting.discard)
+        return said, text
 
     def close(self) -> None:
-        """Let orders be given to their end, and take back all declarations."""
-        self._threads.shutdown()
+        """Let stops be given to their end, and take back all declarations."""
+        self._others.shutdown(cancel_futures=True)
+        self._stops.shutdown()
         self._wire.close()
 
     def _stop(self, said: Future[None]) -> None:
         try:
             say_stop(self._wire, self._scenario, REASON)
         except BaseException as error:
+            # It is said again below: what failed once may not fail twice.
             said.set_exception(error)
-            raise
-        said.set_result(None)
-        self._told(None)
+        else:
+            said.set_result(None)
+            self._told("told", TOLD_TO_STOP)
         if self._watching.acquire(blocking=False):
             try:
                 self._watch()
@@ -93,19 +106,31 @@ class OrderLine:
         elif self._repeating.acquire(blocking=False):
             # Whoever presses again while one listens what came of the last is heard as well.
             try:
-                for _ in range(TIMES - 1):
-                    time.sleep(REPEAT_S)
-                    say_stop(self._wire, self._scenario, REASON)
+                self._repeat()
             finally:
                 self._repeating.release()
 
+    def _repeat(self) -> None:
+        for _ in range(TIMES - 1):
+            time.sleep(REPEAT_S)
+            try:
+                say_stop(self._wire, self._scenario, REASON)
+            except Exception as error:
+                self._told("failed", f"a stop could not be said ({error}); use the robot's switch")
+
     def _watch(self) -> None:
         """Stop everybody as ``abreast stop`` does, and tell what came of it."""
-        wire = self._new_wire()
+        wire: Wire | None = None
         try:
-            self._told(stop_all(wire, self._scenario, REASON))
+            wire = self._new_wire()
+            stopped = stop_all(wire, self._scenario, REASON)
+        except Exception as error:
+            self._told("failed", f"not known what came of it ({error}); use the robot's switch")
+        else:
+            self._told("done" if stopped.done else "failed", stopped.line())
         finally:
-            wire.close()
+            if wire is not None:
+                wire.close()
 
     def _new_wire(self) -> Wire:
         layout = layout_of(self._scenario)

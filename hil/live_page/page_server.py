@@ -15,6 +15,7 @@ from tornado.iostream import StreamClosedError
 from tornado.web import Application, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
+from hil.live_page.bounded_server import BoundedServer
 from hil.live_page.browser_words import (
     LARGEST_WORDS,
     Hello,
@@ -117,6 +118,8 @@ class _Browser(_Checked, WebSocketHandler):
         self.viewer: Viewer | None = None
         self._words, self._since = 0, time.monotonic()
         self._waits: object | None = None
+        self._giving: set[asyncio.Future[None]] = set()
+        self._hung_up = False
 
     def check_origin(self, origin: str) -> bool:
         # All of them are checked in prepare, as those of requests without one are not asked for here.
@@ -137,6 +140,8 @@ class _Browser(_Checked, WebSocketHandler):
         self._waits = IOLoop.current().call_later(_HELLO_S, self._refuse, "no token")
 
     async def on_message(self, message: str | bytes) -> None:
+        if self._hung_up:
+            return
         word = read_word(message)
         if word is None:
             self._refuse("junk")
@@ -151,20 +156,27 @@ class _Browser(_Checked, WebSocketHandler):
         elif isinstance(word, Look):
             self.page.look_at(self.viewer, word.follower)
         else:
-            await self._give(word)
+            # Not waited for: a stop is heard while another order is on its way, and who has gone is let go.
+            giving = asyncio.ensure_future(self._give(word))
+            self._giving.add(giving)
+            giving.add_done_callback(self._giving.discard)
 
     def on_close(self) -> None:
+        self._hung_up = True
         if self._waits is not None:
             IOLoop.current().remove_timeout(self._waits)
             self._waits = None
+        self._go()
+
+    def _go(self) -> None:
         if self.viewer is not None:
             self.page.go(self.viewer)
 
     def _greet(self, word: Hello) -> None:
-        if self.viewer is not None:
+        if self.viewer is not None or self._hung_up:
             return
         if not self.page.admission.admits_token(word.token):
-            self.close(4403, "token")
+            self._hang_up(4403, "token")
             return
         if self.page.is_full:
             self._refuse("too many browsers")
@@ -172,7 +184,7 @@ class _Browser(_Checked, WebSocketHandler):
         if self._waits is not None:
             IOLoop.current().remove_timeout(self._waits)
             self._waits = None
-        self.viewer = Viewer(self._send, lambda: self.close(4408, "too slow"))
+        self.viewer = Viewer(self._send, lambda: self._hang_up(4408, "too slow"))
         self.page.enter(self.viewer)
 
     async def _give(self, order: Order) -> None:
@@ -194,7 +206,13 @@ class _Browser(_Checked, WebSocketHandler):
     def _refuse(self, cause: str) -> None:
         self._waits = None
         self.page.admission.refuse(cause)
-        self.close(4400, cause)
+        self._hang_up(4400, cause)
+
+    def _hang_up(self, code: int, reason: str) -> None:
+        """Close, and hear and count whom we closed no longer, however long it takes to go."""
+        self._hung_up = True
+        self._go()
+        self.close(code, reason)
 
 
 def _let_go(sent: asyncio.Future[None]) -> None:
@@ -223,11 +241,12 @@ def http_server(page: LivePage) -> HTTPServer:
         websocket_ping_interval=_LOST_S / 2,
         websocket_ping_timeout=_LOST_S / 2,
     )
-    return HTTPServer(
+    return BoundedServer(
         application,
+        refuse=lambda: page.admission.refuse("too many connections"),
         max_header_size=16_384,
         max_body_size=2 * LARGEST_WORDS,
         max_buffer_size=1 << 20,
         body_timeout=_HELLO_S,
-        idle_connection_timeout=60.0,
+        idle_connection_timeout=_LOST_S,
     )

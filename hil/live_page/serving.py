@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import ipaddress
 import os
+import re
 import secrets
 import socket
 
@@ -18,19 +19,21 @@ from hil.wire.session import Endpoints
 
 LOOPBACK, USUAL_PORT = "127.0.0.1", 7480
 TOKEN_VARIABLE = "ABREAST_LIVE_TOKEN"
+_LONGEST_TOKEN = 256
+_TOKEN = re.compile(rf"[A-Za-z0-9_-]{{{SHORTEST_TOKEN},{_LONGEST_TOKEN}}}")
 _TELL_S = 2.0
 
 
 def new_token() -> str:
     """The token that the environment gives, else a random one.
 
-    Raises :class:`UsageError` for one that could be guessed.
+    Raises :class:`UsageError` for one that could be guessed, or that an address cannot bear.
     """
     given = os.environ.get(TOKEN_VARIABLE, "")
-    if given and len(given) < SHORTEST_TOKEN:
+    if given and not _TOKEN.fullmatch(given):
         raise UsageError(
-            f"{TOKEN_VARIABLE} has {len(given)} characters, expected {SHORTEST_TOKEN} at least; "
-            "leave it out for a random one"
+            f"{TOKEN_VARIABLE} has {len(given)} characters, expected {SHORTEST_TOKEN} to {_LONGEST_TOKEN} "
+            "of [A-Za-z0-9_-], as it is part of an address; leave it out for a random one"
         )
     return given or secrets.token_urlsafe(SHORTEST_TOKEN)
 

@@ -93,7 +93,8 @@ def test_a_stop_that_hears_only_itself_has_stopped_nobody(lab: tuple[str, Wire])
     wire.subscribe(["stop", "follower/cmd_vel"])
     done = ran("stop", "--connect", endpoint)
     assert done.returncode == 1
-    assert "nothing was heard of leader, follower on this wire; give --scenario FILE" in done.stderr
+    assert "nothing was heard of leader, follower on this wire; use the robot's switch" in done.stderr
+    assert "give --scenario FILE" in done.stderr
     assert done.stderr.count("\n") == 1
     heard = {event.topic for event in iter(lambda: wire.inbox.take(0.2), None)}
     assert heard == {"stop", "follower/cmd_vel"}

@@ -16,8 +16,8 @@ JSON = st.recursive(
 
 def test_what_a_browser_says_is_read() -> None:
     assert read_word('{"say":"stop"}') == Stop()
-    assert read_word('{"say":"arm","robot":"leader"}') == Arm("leader")
-    assert read_word('{"say":"side","side":"left"}') == ChangeSide("left")
+    assert read_word('{"say":"arm","frame":7,"robot":"leader"}') == Arm(7, "leader")
+    assert read_word('{"say":"side","frame":7,"side":"left"}') == ChangeSide(7, "left")
     posted = read_post(b'{"token":"t","order":{"say":"stop"}}')
     assert posted is not None
     assert (posted.token, posted.order) == ("t", Stop())
@@ -29,13 +29,15 @@ def test_what_a_browser_says_is_read() -> None:
         "",
         "stop",
         '{"say":"sto"}',
-        '{"say":"side","side":"up"}',
-        '{"say":"arm","robot":7}',
+        '{"say":"side","frame":7,"side":"up"}',
+        '{"say":"arm","frame":7,"robot":7}',
+        '{"say":"arm","robot":"leader"}',
+        '{"say":"side","side":"left"}',
         '{"say":"look","follower":-1}',
         '{"say":"seen","frame":1e99}',
         '{"say":"stop","reason":"x"}',
         "[" * 2000,
-        '{"say":"arm","robot":"' + "x" * 300 + '"}',
+        '{"say":"arm","frame":7,"robot":"' + "x" * 300 + '"}',
         b"\xff\xfe",
     ],
 )

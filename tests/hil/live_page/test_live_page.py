@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import threading
 import time
 from collections.abc import Callable, Coroutine
 from pathlib import Path
@@ -10,12 +11,14 @@ from typing import Any
 import pytest
 
 from hil.live.daemon import Ending
+from hil.live_page import order_line
 from hil.live_page.admission import Admission
 from hil.live_page.browser_words import Arm, Stop
 from hil.live_page.live_page import LivePage, Viewer
 from hil.live_page.serving import bound, serve
 from hil.live_page.shown_lab import ShownLab
 from hil.scenario.files import load_scenario
+from hil.wire import topics
 from hil.wire.message_types import String
 from hil.wire.messages import decode_as
 from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
@@ -73,7 +76,7 @@ def test_keys_that_let_nobody_stop_are_said_and_nothing_is_told() -> None:
         told: list[dict[str, Any]] = []
         page.enter(Viewer(lambda text: told.append(json.loads(text)), lambda: None))
         assert told[0]["may_stop"] is False
-        for order in (Stop(), Arm()):
+        for order in (Arm(frame=page._frames.next(time.monotonic())), Stop()):
             given, text = await page.order(order)
             assert not given
             assert "our keys do not let us" in text
@@ -92,6 +95,78 @@ def test_a_browser_that_sees_nothing_for_long_is_left(monkeypatch: pytest.Monkey
         monkeypatch.setattr(page, "_clock", lambda: begun + 20.0)
         page.go_round()
         assert left
+        assert page._viewers == [], "it counts no longer, though its connection never ends"
+
+    with_page(talk)
+
+
+def test_an_order_that_comes_after_a_stop_is_refused_until_a_frame_was_seen_since() -> None:
+    async def talk(page: LivePage) -> None:
+        told: list[dict[str, Any]] = []
+        page.enter(Viewer(lambda text: told.append(json.loads(text)), lambda: None))
+        page.go_round()
+        late = Arm(frame=told[-1]["n"])
+        assert (await page.order(late))[0]
+        assert (await page.order(Stop()))[0]
+        assert await page.order(late) == (False, page._frames.refusal(late.frame, time.monotonic()))
+        page.go_round()
+        frames = [each for each in told if each["kind"] == "frame"]
+        assert frames[-1]["n"] > late.frame
+
+    with_page(talk)
+
+
+def test_an_order_that_cannot_be_said_is_not_said_to_be_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def talk(page: LivePage) -> None:
+        def broken(*_: object) -> None:
+            raise OSError("broken")
+
+        monkeypatch.setattr(page._orders._wire, "publish", broken)
+        arm = Arm(frame=page._frames.next(time.monotonic()))
+        assert await page.order(arm) == (False, "not told: broken")
+        assert await page.order(Stop()) == (False, "not told: broken; use the robot's switch")
+
+    with_page(talk)
+
+
+def test_a_stop_goes_ahead_of_orders_that_are_stuck_and_drops_those_that_wait(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def talk(page: LivePage) -> None:
+        free, publish = threading.Event(), page._orders._wire.publish
+        said: list[str] = []
+
+        def stuck(topic: str, payload: bytes) -> None:
+            said.append(topic)
+            if topic == topics.ARM:
+                free.wait(60.0)
+            publish(topic, payload)
+
+        monkeypatch.setattr(page._orders._wire, "publish", stuck)
+        arm = Arm(frame=page._frames.next(time.monotonic()))
+        arming = [asyncio.ensure_future(page.order(arm)) for _ in range(8)]
+        await asyncio.sleep(0.1)
+        assert (await page.order(Stop()))[0]
+        answers = [await each for each in arming]
+        free.set()
+        assert answers == [(False, "not known whether it was told")] + 7 * [
+            (False, "not told: a stop came first")
+        ]
+        assert said.count(topics.ARM) == 1
+
+    with_page(talk)
+
+
+def test_what_came_of_a_stop_is_told_where_it_cannot_be_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def talk(page: LivePage) -> None:
+        told: list[dict[str, Any]] = []
+        page.enter(Viewer(lambda text: told.append(json.loads(text)), lambda: None))
+        monkeypatch.setattr(order_line, "stop_all", lambda *_: 1 / 0)
+        assert (await page.order(Stop()))[0]
+        while told[-1].get("state") != "failed":
+            await asyncio.sleep(0.01)
+        assert "not known what came of it" in told[-1]["text"]
+        assert "use the robot's switch" in told[-1]["text"]
 
     with_page(talk)
 

@@ -54,14 +54,20 @@ def test_only_a_loopback_page_of_a_wire_without_keys_needs_no_token(
         assert not is_open(everywhere, open_wire)
 
 
-def test_a_token_is_random_or_as_told_but_never_short(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_token_is_random_or_as_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(TOKEN_VARIABLE, raising=False)
     assert new_token() != new_token()
     assert len(new_token()) >= 20
     monkeypatch.setenv(TOKEN_VARIABLE, "0123456789abcdef")
     assert new_token() == "0123456789abcdef"
-    monkeypatch.setenv(TOKEN_VARIABLE, "abc")
-    with pytest.raises(UsageError, match="has 3 characters, expected 16"):
+
+
+@pytest.mark.parametrize("token", ["abc", "x" * 257, "0123456789 abcdef", "0123456789#abcdef", "ä" * 20])
+def test_a_token_that_is_short_or_that_an_address_cannot_bear_is_refused(
+    token: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(TOKEN_VARIABLE, token)
+    with pytest.raises(UsageError, match=f"{TOKEN_VARIABLE} has {len(token)} characters, expected 16 to 256"):
         new_token()
 
 
