@@ -118,13 +118,14 @@ class LivePage:
         now = self._clock()
         if self._newest is None:
             return
+        # Also while nobody looks: else it would be taken for new when somebody does again.
+        for event in self._newest.take():
+            self._lab.hear(event, now)
         if not self._viewers:
             if now - self._empty_since > _LINGER_S:
                 self._newest.close()
                 self._newest = None
             return
-        for event in self._newest.take():
-            self._lab.hear(event, now)
         motions: dict[int, dict[str, Any]] = {}
         reports: dict[str, Any] | None = None
         for viewer in list(self._viewers):
