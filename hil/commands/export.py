@@ -12,7 +12,7 @@ from formation.collector import collector_paused
 from hil.commands.outputs import OutputFolder
 from hil.errors import CheckFailedError, UsageError
 from hil.extras import begin_to_judge
-from hil.log.report_json import note, print_json, print_text, results_apart
+from hil.log.report_json import note, print_json, results_apart, say
 
 if TYPE_CHECKING:
     from hil.exports.table_export import TableExport
@@ -101,7 +101,7 @@ def _write_layouts(folder: Path, *, overwrite: bool) -> None:
     if not overwrite:
         refuse_present(folder, LAYOUTS)
     for path in write_layouts(folder):
-        print_text(f"{path}\n")
+        say(path)
 
 
 def _write_foxglove(
@@ -114,7 +114,7 @@ def _write_foxglove(
     if as_json:
         print_json(done.as_dict())
     else:
-        print_text(f"{done.path}: {sum(done.messages.values())} messages on {len(done.messages)} topics\n")
+        say(f"{done.path}: {sum(done.messages.values())} messages on {len(done.messages)} topics")
     _refuse_damage(log, done.damage)
 
 
@@ -146,12 +146,12 @@ def _tell(done: TableExport, *, as_json: bool) -> None:
         note(f"topic {topic}: {count} payloads are no message of its type, and left out")
     _tell_left_out(done.topics.left_out)
     if done.older:
-        click.echo(f"still there from an export before: {', '.join(done.older)}", err=True)
+        note(f"still there from an export before: {', '.join(done.older)}")
     told: dict[str, Any] = done.as_dict()
     if as_json:
         print_json(told)
         return
     rows = ", ".join(f"{count} of {name}" for name, count in done.rows.items())
-    print_text(f"{told['aligned']}: {done.estimates} estimates: {rows or 'none'}\n")
+    say(f"{told['aligned']}: {done.estimates} estimates: {rows or 'none'}")
     for path, count in told["topics"].items():
-        print_text(f"{path}: {count} messages\n")
+        say(f"{path}: {count} messages")

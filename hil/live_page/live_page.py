@@ -130,15 +130,16 @@ class LivePage:
             self._dismiss(viewer)
         if self._newest is None:
             return
+        # Also while nobody looks: else it would be taken for new when somebody does again.
+        for event in self._newest.take():
+            if event.topic == topics.STOP:
+                self._frames.note_stop()
+            self._lab.hear(event, now)
         if not self._viewers:
             if now - self._empty_since > _LINGER_S:
                 self._newest.close()
                 self._newest = None
             return
-        for event in self._newest.take():
-            if event.topic == topics.STOP:
-                self._frames.note_stop()
-            self._lab.hear(event, now)
         number = self._frames.next(now)
         motions: dict[int, dict[str, Any]] = {}
         reports: dict[str, Any] | None = None

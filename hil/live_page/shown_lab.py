@@ -34,6 +34,9 @@ _REPORTS, _STOPS = 128, 16
 _MOST_NODES, _MOST_FINDINGS, _MOST_CAUSES, _LONGEST_CAUSE = 60, 5, 10, 60
 """Of what anybody may report: nodes, of each its findings and causes, and letters of a cause."""
 
+_FRESH_S, _SILENT_S = 1.0, 3.0
+"""For so long [s] what moves is as it was said, and a guard that said something is there."""
+
 _STILL_V, _STILL_U = 0.01, 0.05
 """What wheels say of a robot that stands [m/s, rad/s]."""
 
@@ -62,7 +65,9 @@ class ShownLab:
 
     def forget(self) -> None:
         """Begin anew: nobody has looked for a while, and what was heard then says nothing of now."""
-        self._state, self._guards, self._arrivals = LabState(self._scenario), GuardsHeard(), Arrivals()
+        self._state, self._arrivals = LabState(self._scenario), Arrivals()
+        self._guards = GuardsHeard([robot.name for robot in self._robots])
+        self._guards_at: dict[str, float] = {}
         self._poses: dict[str, tuple[Pose, bool, float]] = {}
         self._stopped_by = ""
         self._motion_since_ns: int | None = None
@@ -75,7 +80,7 @@ class ShownLab:
         if event.topic in self._state.topics:
             self._state.hear(event, now)
         if event.topic == topics.DIAGNOSTICS:
-            self._guards.hear(event.payload)
+            self._guards_at |= dict.fromkeys(self._guards.hear(event.payload), now)
             self._hear_report(event.payload)
         elif event.topic == topics.RIGID_BODIES:
             self._see(event.payload, now)
@@ -120,7 +125,11 @@ class ShownLab:
             "nodes": [_clipped_node(node) for node in nodes[:_MOST_NODES]],
             "more_nodes": max(0, len(nodes) - _MOST_NODES),
             "missing_bodies": told["missing_bodies"],
-            "guards": {clipped(name): clipped(text) for name, text in self._guards.held.items()},
+            "guards": {
+                clipped(name): clipped(text)
+                for name, text in self._guards.held.items()
+                if now - self._guards_at[name] <= _SILENT_S
+            },
             "stop": self._stop(now),
             "malformed": told["malformed"],
             "rates": self._rates(now),

@@ -19,6 +19,7 @@ from hil.live_page.serving import bound, serve
 from hil.live_page.shown_lab import ShownLab
 from hil.scenario.files import load_scenario
 from hil.wire import topics
+from hil.wire.events import Event
 from hil.wire.message_types import String
 from hil.wire.messages import decode_as
 from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
@@ -190,3 +191,22 @@ def test_with_keys_a_token_is_needed_here_too_and_a_stop_goes_out(tmp_path: Path
             event = wire.inbox.take(60.0)
             assert event is not None
             assert decode_as(event.payload, String).data == "stopped by hand on the live page"
+
+
+def test_what_came_while_nobody_looked_is_not_new_to_who_looks_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def talk(page: LivePage) -> None:
+        told: list[dict[str, Any]] = []
+        viewer = Viewer(lambda text: told.append(json.loads(text)), lambda: None)
+        begun = time.monotonic()
+        monkeypatch.setattr(page, "_clock", lambda: begun)
+        page.enter(viewer)
+        page.go(viewer)
+        event = Event("follower/odom", b"", None)
+        monkeypatch.setattr(page._newest, "take", lambda coming=[[event]]: coming.pop() if coming else [])
+        page.go_round()
+        monkeypatch.setattr(page, "_clock", lambda: begun + 4.0)
+        page.enter(Viewer(viewer.send, lambda: None))
+        page.go_round()
+        assert told[-1]["robots"][1]["own_age"] == 4.0
+
+    with_page(talk)

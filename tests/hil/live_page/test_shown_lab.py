@@ -167,3 +167,12 @@ def test_an_old_decision_of_no_measurement_has_no_age_of_one() -> None:
     sent.measured.sec = 0
     lab.hear(Event("follower/command", encode(sent)), 1.0)
     assert shown(lab)[0]["command"]["measurement_age"] is None
+
+
+def test_a_guard_that_is_silent_is_not_shown_as_one_that_lets_its_robot_drive() -> None:
+    lab = ShownLab(SCENARIO)
+    hear(lab)
+    stranger = diagnostics("guard/stranger", 5, "", {"latched": ""})
+    lab.hear(Event("diagnostics", encode(stranger)), 13.0)
+    assert shown(lab, 13.0)[1]["guards"] == {"follower": ""}
+    assert shown(lab, 13.1)[1]["guards"] == {}
