@@ -101,7 +101,7 @@ def _write_layouts(folder: Path, *, overwrite: bool) -> None:
     if not overwrite:
         refuse_present(folder, LAYOUTS)
     for path in write_layouts(folder):
-        say(path)
+        say(str(path))
 
 
 def _write_foxglove(
