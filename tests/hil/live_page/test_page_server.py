@@ -188,6 +188,41 @@ def test_robots_are_armed_and_sent_to_a_side_by_their_topics(lab: Lab) -> None:
     assert sorted(said) == [("arm", ""), ("arm", "leader"), ("follower/side", "left")]
 
 
+def test_an_order_from_before_a_stop_of_somebody_else_is_refused_by_either_way(lab: Lab) -> None:
+    server, wire = lab
+
+    async def order() -> None:
+        socket, _ = await server.greeted()
+        late = {"say": "arm", "frame": (await heard(socket, "frame"))["n"]}
+        reports: dict[str, Any] = {}
+        while (reports.get("stop") or {}).get("reason") != "by another":
+            wire.publish("stop", encode(String(data="by another")))
+            reports = (await heard(socket, "frame")).get("reports", {})
+        await say(socket, **late)
+        answer = await heard(socket, "answer")
+        assert not answer["given"]
+        assert "a stop was given since" in answer["text"]
+        post = {"token": server.token, "order": late}
+        status, said = await asyncio.to_thread(server.request, "/order", post, Origin=server.origin)
+        assert (status, json.loads(said)["text"]) == (200, answer["text"])
+
+    server.run(order())
+    assert "arm" not in {topic for topic, _ in orders_heard(wire)}
+
+
+def test_whom_we_hang_up_on_looks_on_no_more_whatever_it_still_says(lab: Lab) -> None:
+    server, _ = lab
+
+    async def talk() -> None:
+        socket = await server.connect()
+        await socket.write_message("junk")
+        await say(socket, say="hello", token=server.token)
+        assert await socket.read_message() is None
+        assert socket.close_code == 4400
+
+    server.run(talk())
+
+
 def test_pages_of_others_are_refused_and_that_is_said(lab: Lab) -> None:
     server, wire = lab
     stop = {"token": server.token, "order": {"say": "stop"}}
