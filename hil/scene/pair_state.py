@@ -84,7 +84,8 @@ class PairState:
     def note(self, topic: str, payload: bytes, now_ns: int) -> dict[str, Pose]:
         """Take in what else is heard; where robots stand by that, where no frame tells it.
 
-        Raises ValueError, or :class:`MalformedPayloadError`, for what is no such message, and keeps none.
+        Raises ValueError, or :class:`~hil.wire.messages.MalformedPayloadError`, for what is no such
+        message, and keeps none.
         """
         names = self._names
         if topic == names.estimate:
