@@ -26,7 +26,8 @@ export class Arena {
   }
 
   // frame: the newest one; place: of the follower that is looked at; fence: or null; stale: robots not seen of late.
-  draw(frame, place, fence, stale, ink) {
+  // believes: whether what the follower believes is of now.
+  draw(frame, place, fence, stale, believes, ink) {
     const brush = sized(this.canvas), width = this.canvas.clientWidth, height = this.canvas.clientHeight;
     brush.clearRect(0, 0, width, height);
     const view = this.seen(frame, fence, width / height);
@@ -48,7 +49,7 @@ export class Arena {
     frame.robots.forEach((robot, k) => {
       if (robot.pose) body(brush, at, scale, robot.pose, stale(k) ? ink.soft : k ? ink.follower : ink.leader, ink.paper);
     });
-    if (frame.estimate?.leader && BELIEVED.includes(frame.estimate.status)) belief(brush, at, scale, frame, ink);
+    if (believes && frame.estimate?.leader && BELIEVED.includes(frame.estimate.status)) belief(brush, at, scale, frame, ink);
   }
 
   // What is to be in the picture: all tracks, in a frame that grows at once and shrinks slowly.
@@ -116,7 +117,7 @@ function body(brush, at, scale, [x, y, theta], colour, paper) {
   brush.fill();
 }
 
-// The leader as its follower believes it to be, where that is a second later, and the station that follows from it.
+// The leader as its follower believes it to be, where that is two seconds later (AHEAD_S), and the station that follows from it.
 function belief(brush, at, scale, frame, ink) {
   const { pose: [x, y, theta], ellipse } = frame.estimate.leader, v1 = frame.estimate.v1[0];
   if ([x, y, theta, v1].includes(null)) return;

@@ -150,7 +150,7 @@ function inks() {
 function draw() {
   due = false;
   if (!frame || !config) return;
-  arena.draw(frame, place, config.fence, k => old(aged(frame.robots[k].pose_age)), ink);
+  arena.draw(frame, place, config.fence, k => old(aged(frame.robots[k].pose_age)), !old(aged(frame.estimate?.age)), ink);
   for (const each of strips) {
     each.strip.draw(frame.t, ink);
     const { samples } = each.strip, newest = samples[samples.length - 1];
@@ -193,18 +193,21 @@ function robots() {
     const pose = aged(robot.pose_age), told = aged(robot.told_age), own = aged(robot.own_age);
     const guard = reports?.guards[name];
     row.append(head, make("td", seconds(pose), old(pose) ? "bad" : ""), motion(robot.told, told, false, "nothing"),
-      motion(robot.own, own, robot.stands, "none"), make("td", guard === undefined ? "not heard" : guard || "lets it drive", guard ? "bad" : ""));
+      motion(robot.own, own, robot.stands, "none"), make("td", guard === undefined ? "not heard" : guard || "lets it drive", guard === undefined ? "soft" : guard ? "bad" : ""));
     return row;
   });
-  const key = rows.map(row => row.textContent).join();
+  const key = rows.map(row => row.outerHTML).join();
   if (robots.key !== key) put($("robots"), ...rows);
   robots.key = key;
 }
 
-// A cell with speed and turn rate, how old they are, and whether that is a robot that stands.
+// A cell with speed and turn rate, how old they are, and whether that is a robot that stands. What has an age
+// and no values came, and cannot be read.
 function motion(values, age, stands, otherwise) {
-  const cell = make("td", values ? stands ? "stands" : `${signed(values[0], 3)}, ${signed(DEGREES * values[1], 0)}` : otherwise);
-  if (values) cell.append(make("small", `${seconds(age)} ago`, old(age) ? "bad" : ""));
+  const turned = values?.[1] == null ? null : DEGREES * values[1];
+  const text = values ? stands ? "stands" : `${signed(values[0], 3)}, ${signed(turned, 0)}` : age === null ? otherwise : "cannot be read";
+  const cell = make("td", text, old(age) ? "soft" : values ? "" : "bad");
+  if (age !== null) cell.append(make("small", `${seconds(age)} ago`, old(age) ? "bad" : ""));
   return cell;
 }
 
@@ -215,7 +218,7 @@ function told() {
   if (reports.stop) items.push(["bad", `Stopped by ${reports.stop.by} ${seconds(reports.stop.age + later)} ago: ${reports.stop.reason}`]);
   for (const body of reports.missing_bodies) items.push(["bad", `The motion capture does not see ${body}.`]);
   for (const node of reports.nodes) {
-    for (const each of node.findings) items.push(["bad", `${node.name}: ${each.name}: ${each.text}`, each.advice]);
+    for (const each of node.findings) items.push([`bad${node.age_s + later > SILENT_S ? " stale" : ""}`, `${node.name}: ${each.name}: ${each.text}`, each.advice]);
     if (node.age_s + later > SILENT_S) items.push(["bad", `${node.name} has said nothing for ${seconds(node.age_s + later)}.`]);
   }
   if (reports.malformed) items.push(["", `${reports.malformed} messages could not be read.`]);
@@ -237,7 +240,8 @@ function told() {
     return item;
   });
   write($("more"), reports.more_nodes ? `and ${reports.more_nodes} more` : "");
-  write($("rates"), reports.rates.map(each => `${each.name} ${each.rate === null ? "" : `${each.rate.toFixed(0)} Hz, `}${seconds(each.age === null ? null : each.age + later)}`).join(" · "));
+  write($("rates"), reports.rates.map(each => `${each.name} ${each.rate === null ? "" : `${each.rate.toFixed(0)} Hz, `}${seconds(each.age === null ? null : each.age + later)}`).join(" · "),
+    reports.rates.some(each => old(each.age === null ? null : each.age + later, SILENT_S)) ? "bad" : "");
   const side = reports.side;
   write($("side"), side.side ? `, the follower on the ${side.side}${side.change === "none" ? "" : `, side change ${side.change}`}` : "");
 }

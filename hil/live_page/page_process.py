@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import socket
 import subprocess
@@ -25,18 +26,32 @@ class PageProcess:
     def __init__(self, listening: socket.socket, token: str, say: Callable[[str], None]) -> None:
         self._listening, self._token, self._say = listening, token, say
         self._process: subprocess.Popen[bytes] | None = None
-        self._begun_s = 0.0
+        self._clock = time.monotonic
+        self._begun_s, self._has_failed = -math.inf, False
 
     def see_to(self, scenario: Path, joining: Endpoints) -> None:
-        """Start it, and again if it has ended."""
-        process, now = self._process, time.monotonic()
-        if process is not None and (process.poll() is None or now - self._begun_s < _AGAIN_S):
+        """Start it, and again if it has ended or could not be started."""
+        process, now = self._process, self._clock()
+        if (process is not None and process.poll() is None) or now - self._begun_s < _AGAIN_S:
             return
+        self._begun_s = now
         if process is not None:
             self._say(f"the live page ended with exit code {process.returncode}; it is started again")
-        self._begun_s = now
+            self._process = None
+            if process.stdin is not None:
+                process.stdin.close()
+        try:
+            self._process = self._begun(scenario, joining)
+        except OSError as error:
+            if not self._has_failed:
+                self._say(f"the live page cannot be started: {error.strerror or error}; it is tried again")
+            self._has_failed = True
+        else:
+            self._has_failed = False
+
+    def _begun(self, scenario: Path, joining: Endpoints) -> subprocess.Popen[bytes]:
         number = self._listening.fileno()
-        self._process = subprocess.Popen(
+        return subprocess.Popen(
             [*_LIVE, str(scenario), *joining.options, "--tethered", "--listening", str(number)],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,

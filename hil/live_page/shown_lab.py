@@ -41,6 +41,9 @@ _STILL_V, _STILL_U = 0.01, 0.05
 """What wheels say of a robot that stands [m/s, rad/s]."""
 
 
+_SIDES = frozenset(side.value for side in Side)
+
+
 class ShownLab:
     """Takes in what was heard, and tells it as plain data; times are of a clock in seconds.
 
@@ -124,7 +127,7 @@ class ShownLab:
         return {
             "nodes": [_clipped_node(node) for node in nodes[:_MOST_NODES]],
             "more_nodes": max(0, len(nodes) - _MOST_NODES),
-            "missing_bodies": told["missing_bodies"],
+            "missing_bodies": self._unseen(now),
             "guards": {
                 clipped(name): clipped(text)
                 for name, text in self._guards.held.items()
@@ -135,6 +138,15 @@ class ShownLab:
             "rates": self._rates(now),
             "side": dict(zip(("side", "change"), next(iter(self._sides.values()), ("", "")), strict=True)),
         }
+
+    def _unseen(self, now: float) -> list[str]:
+        """Bodies that are not seen, or not any more."""
+        return [robot.body for robot in self._robots if self._fresh_pose(robot, now) is None]
+
+    def _fresh_pose(self, robot: LabRobot, now: float) -> tuple[Pose, bool] | None:
+        """Where a robot was seen of late, and whether its heading was."""
+        pose, heads, at = self._poses.get(robot.name, (None, False, now))
+        return (pose, heads) if pose is not None and now - at <= _FRESH_S else None
 
     def _hear_report(self, payload: bytes) -> None:
         try:
@@ -148,7 +160,7 @@ class ShownLab:
             values = {value.key: value.value for value in status.values}
             if name in STARTERS and (since := reported_number(values.get("motion_since_ns", ""))) is not None:
                 self._motion_since_ns = min(since, stamp_ns)
-            if name in controllers and "side" in values:
+            if name in controllers and values.get("side") in _SIDES:
                 self._sides[controllers[name]] = values["side"], clipped(values.get("side_change", ""))
 
     def _see(self, payload: bytes, now: float) -> None:
@@ -170,7 +182,7 @@ class ShownLab:
                 self._poses[robot.name] = pose, heads, now
 
     def _robot(self, robot: LabRobot, now: float) -> dict[str, Any]:
-        seen, told = self._poses.get(robot.name), self._state.drives.get(robot.cmd_vel)
+        seen, told = self._poses.get(robot.name), self._told(robot)
         wheels = self._arrivals.of(robot.odom)
         turned = wheels.read_as(msg.Odometry) if wheels is not None else None
         own = Motion(turned.twist.twist.linear.x, turned.twist.twist.angular.z) if turned else None
@@ -184,11 +196,22 @@ class ShownLab:
             "stands": abs(own.v) < _STILL_V and abs(own.u) < _STILL_U if own else None,
         }
 
+    def _told(self, robot: LabRobot) -> Motion | None:
+        """What the newest command of a robot says, and not an older one that could be read."""
+        if (arrival := self._arrivals.of(robot.cmd_vel)) is None:
+            return None
+        if self._scenario.controller.command_type == "TwistStamped":
+            stamped = arrival.read_as(msg.TwistStamped)
+            twist = stamped.twist if stamped is not None else None
+        else:
+            twist = arrival.read_as(msg.Twist)
+        return Motion(twist.linear.x, twist.angular.z) if twist is not None else None
+
     def _estimate(self, place: int, pair: Topics, now: float) -> dict[str, Any] | None:
         arrival = self._arrivals.of(pair.estimate)
         if arrival is None or (seen := arrival.read_as(msg.LeaderEstimate)) is None:
             return None
-        own = self._poses.get(self._robots[place + 1].name)
+        own = self._fresh_pose(self._robots[place + 1], now)
         return {
             "age": round(now - arrival.at, 3),
             **shown_estimate(seen, own[0] if own is not None and own[1] else None),
@@ -213,9 +236,7 @@ class ShownLab:
     def _station(self, place: int) -> list[float | None]:
         """The shape that is wanted, on the side that the controller says to keep."""
         word, _ = self._sides.get(self.followers[place], (self._scenario.formation.side, ""))
-        known = [side.value for side in Side]
-        side = Side(word if word in known else self._scenario.formation.side)
-        station = Station(side, self._scenario.formation.bearing)
+        station = Station(Side(word), self._scenario.formation.bearing)
         return [*map(shown, (self._scenario.formation.rho_0, station.alpha1, station.alpha2))]
 
     def _command(self, pair: Topics, now: float) -> dict[str, Any] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -142,10 +143,28 @@ def test_a_lab_that_falls_silent_is_not_shown_as_if_it_spoke(
     page = WatchedPage(chrome, server.address)
     with talking(wire):
         page.wait_until(lambda: page.is_live() and "tracking" in page.text("verdict"))
+        page.wait_until(lambda: "lets it drive" in page.text("robots"))
+        assert page.button("Arm follower").is_enabled()
         page.wait_until(lambda: page.script("return document.getElementById('verdict').className") == "")
     page.wait_until(lambda: page.script("return document.getElementById('verdict').className") == "bad")
     page.wait_until(lambda: "has said nothing for" in page.text("against"))
     page.wait_until(lambda: page.script("return document.querySelectorAll('#nodes .stale').length") == 3)
+    page.wait_until(lambda: not page.button("Arm follower").is_enabled())
+    page.wait_until(lambda: "lets it drive" not in page.text("robots"))
+    assert page.script("return document.querySelectorAll('#robots td.soft').length") == 6
+    assert "The motion capture does not see leader." in page.text("against")
+
+
+def test_a_turn_rate_that_is_no_number_and_what_cannot_be_read_are_no_zeros(
+    lab: tuple[Server, Wire], chrome: Chrome
+) -> None:
+    server, wire = lab
+    page = WatchedPage(chrome, server.address)
+    with talking(wire, Motion(0.2, math.nan)):
+        page.wait_until(lambda: "+0.200, –" in page.text("robots"))
+        assert "+0.200, +0" not in page.text("robots")
+    wire.publish("follower/odom", b"junk")
+    page.wait_until(lambda: "cannot be read" in page.text("robots"))
 
 
 def test_a_server_that_goes_is_said_and_one_that_comes_back_is_found(chrome: Chrome) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -13,9 +15,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import pytest
 from selenium.webdriver import Chrome
 from selenium.webdriver.common.keys import Keys
 
+from hil.live_page.page_process import PageProcess
+from hil.wire.session import Endpoints
 from tests.hil.live_page.watched_page import WatchedPage
 
 PATIENCE = 300.0
@@ -103,3 +108,24 @@ def test_a_run_that_is_killed_leaves_no_page(tmp_path: Path) -> None:
 def test_elsewhere_the_address_has_a_token(tmp_path: Path) -> None:
     with shown_run(tmp_path / "run", 1.0, "--live-address", "0.0.0.0") as (_, address):
         assert re.fullmatch(r"http://[\w.\-\[\]:]+:\d+/#[\w-]{16,}", address)
+
+
+def test_a_page_that_cannot_be_started_is_said_once_and_tried_again(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    tries, lines, now = list[float](), list[str](), [0.0]
+
+    def begin(*_: object, **__: object) -> None:
+        tries.append(now[0])
+        raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        page = PageProcess(listening, "", lines.append)
+        monkeypatch.setattr(page, "_clock", lambda: now[0])
+        with monkeypatch.context() as failing:
+            failing.setattr(subprocess, "Popen", begin)
+            for now[0] in (0.0, 1.0, 2.0, 3.0, 4.0):
+                page.see_to(tmp_path / "scenario.toml", Endpoints())
+    page.close()
+    assert tries == [0.0, 2.0, 4.0]
+    assert lines == [f"the live page cannot be started: {os.strerror(errno.EAGAIN)}; it is tried again"]

@@ -176,3 +176,35 @@ def test_a_guard_that_is_silent_is_not_shown_as_one_that_lets_its_robot_drive() 
     lab.hear(Event("diagnostics", encode(stranger)), 13.0)
     assert shown(lab, 13.0)[1]["guards"] == {"follower": ""}
     assert shown(lab, 13.1)[1]["guards"] == {}
+
+
+def test_what_was_seen_too_long_ago_places_no_believed_leader_and_is_missing() -> None:
+    lab = ShownLab(SCENARIO)
+    hear(lab)
+    lab.hear(Event("follower/leader_estimate", encode(estimate(NUMBERS))), 11.2)
+    motion, reports = shown(lab, 11.2)
+    assert (motion["estimate"]["age"], motion["estimate"]["leader"]) == (0.0, None)
+    assert reports["missing_bodies"] == ["leader", "follower"]
+    for topic, payload in lab_words(LEADER, FOLLOWER, Motion(0.2, -0.1), NUMBERS):
+        if topic == "rigid_bodies":
+            lab.hear(Event(topic, payload), 11.2)
+    motion, reports = shown(lab, 11.2)
+    assert motion["estimate"]["leader"] is not None
+    assert reports["missing_bodies"] == []
+
+
+@pytest.mark.parametrize(("topic", "kind"), [("cmd_vel", "told"), ("odom", "own")])
+def test_what_cannot_be_read_is_not_shown_as_what_was_said_before(topic: str, kind: str) -> None:
+    lab = ShownLab(SCENARIO)
+    hear(lab)
+    lab.hear(Event(f"follower/{topic}", b"junk"), 20.0)
+    _, follower = shown(lab, 20.0)[0]["robots"]
+    assert (follower[kind], follower[f"{kind}_age"]) == (None, 0.0)
+
+
+def test_a_side_that_is_none_is_left() -> None:
+    lab = ShownLab(SCENARIO)
+    for word in ("left", "x" * 5000):
+        said = diagnostics("controller", 5, "", {"side": word, "side_change": "none"})
+        lab.hear(Event("diagnostics", encode(said)), 1.0)
+    assert shown(lab)[1]["side"] == {"side": "left", "change": "none"}
