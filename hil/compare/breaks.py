@@ -39,13 +39,14 @@ class Break:
         return other.share - self.share > max(self.least, _RELATIVE * other.share)
 
 
-def breaks_of(group: Group) -> list[Break | None]:
-    """All that can break in a group, that of most weight first; None where nobody looked."""
-    without = float(sum(not sample.metrics for sample in group.samples))
-    size = len(group.samples)
-    found: list[Break | None] = [Break("runs without a figure", without, size, size, _RUNS)]
-    found.append(_diverged(group))
-    found.append(_untracked(group))
+def breaks_of(groups: Sequence[Group]) -> list[list[Break | None]]:
+    """All that can break in each group, that of most weight first; None where nobody looked."""
+    shared = set.intersection(*({sample.label for sample in group.samples} for group in groups))
+    return [_breaks_of(group, shared) for group in groups]
+
+
+def _breaks_of(group: Group, shared: set[str]) -> list[Break | None]:
+    found = [_without_figures(group, shared), _diverged(group), _untracked(group)]
     found += [_outside(group, pattern) for pattern in BROKEN if pattern != "diverged"]
     return found
 
@@ -80,6 +81,15 @@ def told_parting(better: Break, worse: Break) -> str:
         return f"{shares[0]} {better.words} instead of {shares[1]}"
     mine, theirs = (f"{count:.3g}" if count else "no" for count in counts)
     return f"{mine} {better.words} instead of {theirs}"
+
+
+def _without_figures(group: Group, shared: set[str]) -> Break | None:
+    """Of the runs that all groups have: a log that one alone has tells nothing of the others."""
+    asked = [sample for sample in group.samples if sample.label in shared]
+    if group.kind != RUNS or not asked:
+        return None
+    without = sum(not sample.metrics for sample in asked)
+    return Break("runs without a figure", without, len(asked), len(asked), _RUNS)
 
 
 def _diverged(group: Group) -> Break | None:

@@ -34,6 +34,11 @@ class Sample:
     runs: int = 1
     lost: frozenset[str] = frozenset()
 
+    @property
+    def label(self) -> str:
+        """Its key, or its name where it has none."""
+        return self.key or self.name
+
     def knows(self, name: str) -> bool:
         """Whether it has a metric, be it one that has no part in a comparison."""
         return name in self.metrics or name in self.lost

@@ -28,7 +28,7 @@ def verdict_on(groups: Sequence[Group]) -> Verdict:
     """The better group and why: by what should not be at all, else by the errors of the headlines."""
     first, *others = groups
     scores = [0.0, *(_score(first, other) for other in others)]
-    breaks = [breaks_of(group) for group in groups]
+    breaks = breaks_of(groups)
     best = _best(range(len(groups)), breaks, scores)
     next_best = 0
     if best is None:

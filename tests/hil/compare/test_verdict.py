@@ -113,11 +113,8 @@ def test_unlike_breaks_are_not_summed_and_near_ones_are_alike() -> None:
     samples = {"estimation.samples": 1000.0, "estimation.untracked": 0.0}
     near = of("A", samples | {V1: 2.0, OUTSIDE: 94.0}), of("B", samples | {V1: 1.0, OUTSIDE: 96.0})
     assert verdict_on(near).best == "B"
-    lost = (
-        of("A", samples | {V1: 1.0, "estimation.untracked": 300.0}),
-        of("B", samples | {OUTSIDE: 900.0, V1: 1.0}),
-    )
-    assert verdict_on(lost).best == "B"
+    lost = of("A", samples | {V1: 1.0, OUTSIDE: 0.0, "estimation.untracked": 300.0})
+    assert verdict_on([lost, of("B", samples | {V1: 1.0, OUTSIDE: 900.0})]).best == "B"
 
 
 def test_lost_track_of_a_chain_counts() -> None:
@@ -130,13 +127,10 @@ def test_lost_track_of_a_chain_counts() -> None:
 
 def test_chance_is_of_what_speaks_for_the_better_one() -> None:
     """v1 is better on the whole, but scattered; that alpha1 is surely worse does not make it sure."""
-    v1 = [9.0, 0.1, 9.0, 0.1, 9.0, 0.1, 9.0, 0.1]
+    v1 = [0.1, 0.1, 9.0, 0.1, 9.0, 0.1, 9.0, 0.1]
     alpha1 = "estimation.rmse.alpha1"
     first = of("A", *({V1: 5.0 + 0.01 * n, alpha1: 1.0 + 0.001 * n} for n in range(8)))
-    other = of("B", *({V1: 0.3 * value, alpha1: 1.1 + 0.001 * n} for n, value in enumerate(v1)))
+    other = of("B", *({V1: value, alpha1: 1.1 + 0.001 * n} for n, value in enumerate(v1)))
     verdict = verdict_on([first, other])
-    tested = change_of(V1, first, other)
-    assert tested is not None
     assert verdict.best == "B"
-    assert "2 of 2" not in verdict.text
-    assert ("; more than chance" in verdict.text) == (not tested.may_be_chance)
+    assert verdict.text.endswith("; which may be chance (at 5 %).")
