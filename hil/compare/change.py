@@ -7,7 +7,7 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hil.compare.group import Group
+from hil.compare.group import SWEEP, Group, Sample
 from hil.compare.metrics import goal_of
 
 CHANCE = 0.05
@@ -26,7 +26,9 @@ class Change:
     says nothing, as of values below zero. ``difference`` likewise. ``better``: None where the goal is not
     known or nothing changed. ``pairs``: how many twins there are, 0 where samples are no twins of each other;
     ``better_in``, ``worse_in``: in how many the other is better, or worse. ``chance``: p-value of Wilcoxon's
-    signed ranks for twins, else of Mann and Whitney's test; None with too few samples to tell.
+    signed ranks for twins, else of Mann and Whitney's test; None with too few samples to tell, and of a
+    sweep, whose cells share their seeds. ``same``: whether no value changed. Counts of a sweep
+    are those of as many runs, or samples, as the first has.
     """
 
     ratio: float | None
@@ -36,10 +38,7 @@ class Change:
     better_in: int
     worse_in: int
     chance: float | None
-
-    def is_none(self, first: float) -> bool:
-        """Whether nothing changed from a first value."""
-        return abs(self.difference) <= _SAME * abs(first)
+    same: bool
 
     @property
     def may_be_chance(self) -> bool | None:
@@ -52,6 +51,10 @@ def change_of(name: str, first: Group, other: Group) -> Change | None:
     before, after = first.values(name), other.values(name)
     if not before or not after:
         return None
+    if first.adds_up(name):
+        amounts = [_amount(name, sweep) for sweep in (first, other)]
+        if all(amounts):
+            after = [value * amounts[0] / amounts[1] for value in after]
     twins = twins_of(name, first, other)
     if twins:
         ratios = [_ratio(old, new) for old, new in twins]
@@ -67,29 +70,59 @@ def change_of(name: str, first: Group, other: Group) -> Change | None:
         pairs = twins or [(_median(before), _median(after))]
         gains = [goal.cost(old) - goal.cost(new) for old, new in pairs]
         if twins:
-            wins, losses = sum(gain > 0.0 for gain in gains), sum(gain < 0.0 for gain in gains)
+            real = [0.0 if _equal(*pair) else gain for pair, gain in zip(pairs, gains, strict=True)]
+            wins, losses = sum(gain > 0.0 for gain in real), sum(gain < 0.0 for gain in real)
         gain = goal.cost(_median(before)) - goal.cost(_median(after)) if not twins else _gain(gains)
         better = None if not abs(gain) > _SAME * max(map(abs, (*before, *after))) else gain > 0.0
-    return Change(ratio, difference, better, len(twins), wins, losses, _chance(twins, before, after))
+    chance = None if first.kind == SWEEP else _chance(twins, before, after)
+    same = _all_same(twins, before, after)
+    return Change(ratio, difference, better, len(twins), wins, losses, chance, same)
 
 
 def twins_of(name: str, first: Group, other: Group) -> list[tuple[float, float]]:
     """Values of a metric of samples that are the same in both groups but for what is compared.
 
-    By their keys, else by their names; empty where these tell nothing, as for one run beside another.
+    Empty where nothing tells which these are.
     """
     if first.adds_up(name):
         return []
+    both = [(old.metrics, new.metrics) for old, new in twin_samples(first, other)]
+    return [(old[name], new[name]) for old, new in both if name in old and name in new]
+
+
+def twin_samples(first: Group, other: Group) -> list[tuple[Sample, Sample]]:
+    """Samples that are the same in both groups but for what is compared.
+
+    By their keys, else by their names, where both groups have the same of them and none twice; empty
+    otherwise, and for one run beside another.
+    """
     for attribute in ("key", "name"):
         sides = []
         for group in (first, other):
             known = {getattr(each, attribute): each for each in group.samples if getattr(each, attribute)}
             sides.append(known if len(known) == len(group.samples) else {})
-        shared = [label for label in sides[0] if label in sides[1]]
-        if len(shared) > 1:
-            both = [(sides[0][label].metrics, sides[1][label].metrics) for label in shared]
-            return [(old[name], new[name]) for old, new in both if name in old and name in new]
+        if set(sides[0]) == set(sides[1]) and (len(sides[0]) > 1 or first.kind == SWEEP):
+            return [(sample, sides[1][label]) for label, sample in sides[0].items()]
     return []
+
+
+def _amount(name: str, sweep: Group) -> float:
+    """Of how many samples, or runs, a count of a sweep is one."""
+    samples = sum(sweep.values("samples"))
+    if name.startswith("bounds.violations."):
+        return samples
+    return samples + sum(sweep.values("untracked")) if name == "untracked" else float(sweep.runs)
+
+
+def _equal(old: float, new: float) -> bool:
+    return math.isclose(old, new, rel_tol=_SAME)
+
+
+def _all_same(twins: Sequence[tuple[float, float]], before: Sequence[float], after: Sequence[float]) -> bool:
+    if len(before) != len(after):
+        return _equal(min(*before, *after), max(*before, *after))
+    pairs = twins if len(twins) == len(before) else zip(sorted(before), sorted(after), strict=True)
+    return all(_equal(old, new) for old, new in pairs)
 
 
 def _gain(gains: Sequence[float]) -> float:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from hil.compare.change import Change, change_of
 from hil.compare.conditions import Failure
 from hil.compare.group import RUNS, Group, Spread
-from hil.compare.metrics import goal_of, in_order
+from hil.compare.metrics import HEADLINES, goal_of, in_order
 from hil.compare.verdict import Verdict, verdict_on
+from hil.judge.dotted_figures import bare
 from hil.reports.sweep_cells import estimators_of
 
 _MOST_VALUES = 5
@@ -100,7 +101,10 @@ _NOISE = ("mocap.", "robot.", "leader.", "run.duration_s", "duration_s")
 
 
 def _notes(groups: Sequence[Group], differences: dict[str, tuple[tuple[str, ...], ...]]) -> list[str]:
-    notes = []
+    notes = [note for group in groups for note in group.notes]
+    notes += _gone(groups)
+    if len({tuple(sample.runs for sample in group.samples) for group in groups if group.kind != RUNS}) > 1:
+        notes.append("they did not do as many runs of each cell; counts are compared as shares of these")
     harder = [key for key in differences if key.startswith(_NOISE)]
     if harder:
         named = ", ".join(harder[:_MOST_VALUES]) + (" and more" if len(harder) > _MOST_VALUES else "")
@@ -109,7 +113,8 @@ def _notes(groups: Sequence[Group], differences: dict[str, tuple[tuple[str, ...]
         )
     if groups[0].kind == RUNS and any(len(group.samples) == 1 for group in groups):
         notes.append("the spread of a single run is not known: name folders of several runs to have it")
-    if any(not each.facts for group in groups if group.kind == RUNS for each in group.samples):
+    judged = (each for group in groups if group.kind == RUNS for each in group.samples if each.metrics)
+    if any(not each.facts for each in judged):
         notes.append("of some runs the log is gone, and with it their scenario and version")
     foils = dict.fromkeys(name for group in groups for name in _foils(group))
     if foils:
@@ -118,6 +123,18 @@ def _notes(groups: Sequence[Group], differences: dict[str, tuple[tuple[str, ...]
         names = ", ".join(group.label for group in left_out)
         notes.append(f"cells of {names} that not all of them have are left out")
     return notes
+
+
+def _gone(groups: Sequence[Group]) -> Iterator[str]:
+    """Of which groups samples lack the first headline that is known, as they broke down."""
+    known = in_order(set[str]().union(*(group.known for group in groups)))
+    name = next((each for each in known if bare(each) in HEADLINES), None)
+    if name is None:
+        return
+    for group in groups:
+        if lacking := sum(not sample.knows(name) for sample in group.samples):
+            what = "runs" if group.kind == RUNS else "cells"
+            yield f"of {group.label} {lacking} of {len(group.samples)} {what} know no {name}"
 
 
 def _foils(sweep: Group) -> list[str]:

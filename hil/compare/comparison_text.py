@@ -47,15 +47,18 @@ def metric_row(comparison: Comparison, name: str) -> list[str]:
 
 def change_text(comparison: Comparison, name: str, group: Group) -> str:
     """By how much a metric changed from the first group, whether that is better, and whether it is chance."""
-    change, first = comparison.change(name, group), comparison.spread(name, comparison.groups[0])
-    if change is None or first is None:
+    change = comparison.change(name, group)
+    if change is None:
         return "–"
-    if change.is_none(first.median):
+    if change.same:
         return "same"
     if change.ratio is not None and math.isfinite(change.ratio):
         told = f"× {change.ratio:.3g}"
     else:
         told = f"{'+' * (change.difference > 0.0)}{shown(name, change.difference)}"
+    if change.better is None and change.pairs:
+        counts = (("better", change.better_in), ("worse", change.worse_in))
+        told += ",".join(f" {word} {count}/{change.pairs}" for word, count in counts if count)
     if change.better is not None:
         told += " better" if change.better else " worse"
     if change.better is not None and change.pairs:
@@ -64,10 +67,9 @@ def change_text(comparison: Comparison, name: str, group: Group) -> str:
 
 
 def is_same(comparison: Comparison, name: str) -> bool:
-    """Whether all groups have the same median of a metric."""
-    first = comparison.spread(name, comparison.groups[0])
+    """Whether all groups have the same values of a metric."""
     changes = [comparison.change(name, group) for group in comparison.groups[1:]]
-    return first is not None and all(each is not None and each.is_none(first.median) for each in changes)
+    return all(each is not None and each.same for each in changes)
 
 
 def spread_text(name: str, spread: Spread | None) -> str:

@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from hil.compare.change import change_of
-from hil.compare.group import Group, Spread
+from hil.compare.change import change_of, twin_samples
+from hil.compare.group import SWEEP, Group, Spread
 from hil.compare.metrics import shown, unit_of
 from hil.errors import UsageError
 
@@ -76,7 +76,7 @@ def failures_of(conditions: Sequence[Condition], groups: Sequence[Group]) -> lis
 
     Raises :class:`UsageError` for a metric that no group knows, and for a ratio that says nothing.
     """
-    known = set[str]().union(*(group.metrics for group in groups))
+    known = set[str]().union(*(group.known for group in groups))
     for condition in conditions:
         if condition.name not in known:
             near = get_close_matches(condition.name, sorted(known), n=1, cutoff=0.0)
@@ -88,9 +88,11 @@ def failures_of(conditions: Sequence[Condition], groups: Sequence[Group]) -> lis
 
 def _failure(condition: Condition, first: Group, other: Group) -> Failure | None:
     name = condition.name
-    if not other.values(name):
+    if (lost := _lost(name, first, other)) is not None:
+        return Failure(condition, other.label, None, lost)
+    if not other.values(name) and not other.known & {name}:
         return Failure(condition, other.label, None, f"{name} is not known in {other.label} any more")
-    if condition.what == VALUE:
+    if condition.what == VALUE and other.values(name):
         value = Spread.of(other.values(name)).median
         told = f"{name} is {value:.6g}"
         return _told(condition, other, value, told)
@@ -114,6 +116,22 @@ def _failure(condition: Condition, first: Group, other: Group) -> Failure | None
         )
     ratio = change.ratio or 0.0
     return _told(condition, other, ratio, f"{name} is {ratio:.4g} times the first ({was})")
+
+
+def _lost(name: str, first: Group, other: Group) -> str | None:
+    """That a metric of the first group is gone from samples of another, in words; None where it is not."""
+    twins = twin_samples(first, other)
+    gone = sum(old.knows(name) and not new.knows(name) for old, new in twins)
+    what = "cells" if first.kind == SWEEP else "runs"
+    if gone:
+        return f"{name} is not known in {gone} of {len(twins)} {what} of {other.label} any more"
+    share, before = other.share_that_knows(name), first.share_that_knows(name)
+    if twins or share >= before:
+        return None
+    return (
+        f"{name} is known in {100.0 * share:.0f} % of the {what} of {other.label} instead of "
+        f"{100.0 * before:.0f} %"
+    )
 
 
 def _told(condition: Condition, other: Group, value: float, text: str) -> Failure | None:

@@ -57,7 +57,11 @@ def _matched(sweeps: Sequence[Group]) -> list[Group]:
         replace(
             sweep,
             samples=tuple(
-                replace(cells[key], metrics={n: v for n, v in cells[key].metrics.items() if n in known[key]})
+                replace(
+                    cells[key],
+                    metrics={name: cells[key].metrics[name] for name in sorted(known[key])},
+                    lost=frozenset(cells[key].metrics) - known[key],
+                )
                 for key in shared
             ),
         )
@@ -95,12 +99,14 @@ def _of_results(path: Path, file: Path, label: str) -> Group:
     """A sweep, or logs that were judged in one go."""
     tree = _json(file)
     if "logs" in tree:
-        judged = [each for each in tree["logs"] if "summary" in each]
-        if not judged:
+        logs = tree["logs"]
+        if not any("summary" in each for each in logs):
             raise UsageError(f"{path}: none of its logs could be judged; nothing to compare")
         root = Path(str(tree.get("folder", "")))
-        samples = [_judged(root, each) for each in judged]
-        return Group(label, path, RUNS, tuple(samples), {})
+        samples = [_judged(root, each) for each in logs]
+        failed = sum(bool(each.get("failed")) for each in logs)
+        notes = [f"of {label} {failed} of {len(logs)} runs failed a check"] * bool(failed)
+        return Group(label, path, RUNS, tuple(samples), {}, (*notes, *_interrupted(tree, label)))
     cells: Sequence[Mapping[str, Any]] = tree.get("cells", [])
     if not cells:
         raise UsageError(f"{path}: its results.json has no cells; nothing to compare")
@@ -113,19 +119,27 @@ def _of_results(path: Path, file: Path, label: str) -> Group:
         for number, cell in enumerate(cells)
         if str(cell["estimator"]) in asked
     ]
-    return Group(label, path, SWEEP, tuple(samples), tree)
+    return Group(label, path, SWEEP, tuple(samples), tree, _interrupted(tree, label))
+
+
+def _interrupted(tree: Mapping[str, Any], label: str) -> tuple[str, ...]:
+    return (f"{label} was interrupted, so that it lacks runs",) if tree.get("interrupted") else ()
 
 
 def _cell(number: int, cell: Mapping[str, Any], facts: Mapping[str, str], alone: bool) -> Sample:
     """A cell; of a single estimator it is the same whichever that is."""
     key = point_of(cell) if alone else f"{cell['estimator']} at {point_of(cell)}"
     metrics = metrics_of(cell) if is_known(cell) else {"diverged": float(cell["diverged"])}
-    return Sample(f"cell {number}", key, metrics, facts)
+    return Sample(f"cell {number}", key, metrics, facts, runs=int(cell["runs"]))
 
 
 def _judged(root: Path, each: Mapping[str, Any]) -> Sample:
-    log, summary = root / str(each["log"]), each["summary"]
-    return Sample(str(each["log"]), str(each["log"]), metrics_of(summary), _facts(log, summary), _there(log))
+    """A judged log; without any metric where it could not be judged."""
+    name = str(each["log"])
+    log, summary = root / name, each.get("summary")
+    if summary is None:
+        return Sample(name, name, {}, {})
+    return Sample(name, name, metrics_of(summary), _facts(log, summary), _there(log))
 
 
 def _runs(path: Path) -> Iterator[Sample]:

@@ -21,7 +21,8 @@ class Sample:
     ``name``: within its group. ``key``: what it has in common with its twin in another group, the seed of a
     run or the point of a cell; empty where nothing is known. ``metrics`` by dotted names. ``facts``: under
     which conditions, as text by the scenario's keys. ``log``: where its log is, None if it is not there.
-    ``estimates``: a table of estimates that take the place of those in the log.
+    ``estimates``: a table of estimates that take the place of those in the log. ``runs``: how many it is of.
+    ``lost``: metrics of a cell that have no part, as a cell of another sweep at its place lacks them.
     """
 
     name: str
@@ -30,22 +31,51 @@ class Sample:
     facts: Mapping[str, str]
     log: Path | None = None
     estimates: Path | None = None
+    runs: int = 1
+    lost: frozenset[str] = frozenset()
+
+    @property
+    def label(self) -> str:
+        """Its key, or its name where it has none."""
+        return self.key or self.name
+
+    def knows(self, name: str) -> bool:
+        """Whether it has a metric, be it one that has no part in a comparison."""
+        return name in self.metrics or name in self.lost
 
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Samples of one kind that were named together. ``tree``: JSON of a sweep, empty for runs."""
+    """Samples of one kind that were named together.
+
+    ``tree``: JSON of a sweep, empty for runs. ``notes``: what a reader should know of how it came to be.
+    """
 
     label: str
     path: Path
     kind: str
     samples: tuple[Sample, ...]
     tree: Mapping[str, Any]
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def metrics(self) -> set[str]:
         """Names of all metrics that a sample has."""
         return {name for sample in self.samples for name in sample.metrics}
+
+    @cached_property
+    def known(self) -> set[str]:
+        """Names of all metrics that a sample knows, be they without a part in a comparison."""
+        return self.metrics.union(*(sample.lost for sample in self.samples))
+
+    @property
+    def runs(self) -> int:
+        """How many runs all samples are of."""
+        return sum(sample.runs for sample in self.samples)
+
+    def share_that_knows(self, name: str) -> float:
+        """Share of the samples that know a metric."""
+        return sum(sample.knows(name) for sample in self.samples) / len(self.samples)
 
     def values(self, name: str) -> list[float]:
         """Values of a metric, of the samples that have it; of a sweep's counts their sum alone."""

@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 
+from hil.compare.breaks import Break, breaks_of, least_broken, parting, told_parting
 from hil.compare.change import Change, change_of
-from hil.compare.group import RUNS, Group, Spread
-from hil.compare.metrics import BROKEN, HEADLINES, UNTRACKED, in_order, shown, unit_of
+from hil.compare.group import SWEEP, Group, Spread
+from hil.compare.metrics import HEADLINES, in_order, shown, unit_of
 from hil.judge.dotted_figures import bare
 
 _NEGLIGIBLE = 0.02
 """Share by which errors must differ to be worth a word."""
-_LOST_TRACK = 0.01
-"""Share of estimates without a track that is no mere start."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,26 +28,36 @@ def verdict_on(groups: Sequence[Group]) -> Verdict:
     """The better group and why: by what should not be at all, else by the errors of the headlines."""
     first, *others = groups
     scores = [0.0, *(_score(first, other) for other in others)]
-    breaks = [_broken(group) for group in groups]
-    totals = [float(f"{sum(each.values()):.1g}") for each in breaks]
-    known = [score for score in scores if score is not None]
-    if len(known) < len(scores) and len(set(totals)) == 1:
+    breaks = breaks_of(groups)
+    best = _best(range(len(groups)), breaks, scores)
+    next_best = 0
+    if best is None:
         return Verdict(None, "Which was better cannot be told: they know no error in common.")
-    ranks = [
-        (total, math.inf if score is None else score) for total, score in zip(totals, scores, strict=True)
-    ]
-    order = sorted(range(len(groups)), key=lambda n: ranks[n])
-    best, next_best = order[0], 0 if order[0] else order[1]
+    if best == 0:
+        next_best = _best(range(1, len(groups)), breaks, scores) or 1
     better, worse = groups[best], groups[next_best]
-    gap = ranks[next_best][1] - ranks[best][1]
-    if totals[best] == totals[next_best] and not gap > _NEGLIGIBLE:
+    decided = parting(breaks[best], breaks[next_best])
+    gap = (scores[next_best] or 0.0) - (scores[best] or 0.0)
+    if decided is None and not gap > _NEGLIGIBLE:
         return Verdict(None, f"{better.label} and {worse.label} are alike{_but(worse, better)}.")
     which = f"better than {worse.label}"
     if len(groups) > 2:
         which = f"the best of {len(groups)}, {'ahead of' if best == 0 else 'against'} {worse.label}"
-    because = _fewer(breaks[best], breaks[next_best])
+    because = "" if decided is None else told_parting(*decided)
     reasons = "; ".join(filter(None, [because, _reasons(worse, better)]))
-    return Verdict(better.label, f"{better.label} was {which}: {reasons}{_trust(worse, better)}.")
+    trust = _trust(worse, better, by_errors=decided is None)
+    return Verdict(better.label, f"{better.label} was {which}: {reasons}{trust}.")
+
+
+def _best(
+    among: Sequence[int], breaks: Sequence[Sequence[Break | None]], scores: Sequence[float | None]
+) -> int | None:
+    """The best of some groups; None where several broke as little and the errors of one are not known."""
+    left = [among[n] for n in least_broken([breaks[n] for n in among])]
+    if len(left) == 1:
+        return left[0]
+    known = [(score, n) for n in left if (score := scores[n]) is not None]
+    return min(known)[1] if len(known) == len(left) else None
 
 
 def _score(first: Group, other: Group) -> float | None:
@@ -64,34 +72,6 @@ def _score(first: Group, other: Group) -> float | None:
 
 def _headlines(first: Group, other: Group) -> list[str]:
     return in_order({name for name in first.metrics & other.metrics if bare(name) in HEADLINES})
-
-
-def _broken(group: Group) -> dict[str, float]:
-    """What should be none, by its words: per run, in a sweep in total."""
-    found: dict[str, float] = {}
-    per = len(group.samples) if group.kind == RUNS else 1
-    for name in group.metrics:
-        for pattern, words in BROKEN.items():
-            if fnmatchcase(bare(name), pattern) and (total := sum(group.values(name))):
-                found[words] = found.get(words, 0.0) + total / per
-    for name, tracked in UNTRACKED.items():
-        lost = sum(group.values(name))
-        if lost > _LOST_TRACK * (lost + sum(group.values(tracked))):
-            found["estimates that did not say tracking"] = lost / per
-    return found
-
-
-def _fewer(best: dict[str, float], other: dict[str, float]) -> str:
-    """What the better one has less of."""
-    less = [(words, best.get(words, 0.0), count) for words, count in other.items()]
-    told = [
-        f"{_count(mine)} {words} instead of {_count(count)}" for words, mine, count in less if mine < count
-    ]
-    return ", ".join(told)
-
-
-def _count(number: float) -> str:
-    return "no" if not number else f"{number:.3g}"
 
 
 def _reasons(worse: Group, better: Group) -> str:
@@ -134,14 +114,20 @@ def _told(name: str, worse: Group, better: Group, change: Change) -> str:
     return f"{HEADLINES[bare(name)]}{whose} {values} ({percent})"
 
 
-def _trust(worse: Group, better: Group) -> str:
-    """How far chance may have done it."""
+def _trust(worse: Group, better: Group, *, by_errors: bool) -> str:
+    """How far chance may have done what speaks for the better one; of errors alone."""
+    if better.kind == SWEEP:  # cells share their seeds
+        return ""
     if min(len(worse.samples), len(better.samples)) == 1:
         return "; with one run on a side the spread is not known"
-    known = [change for _, change in _changes(worse, better)]
+    known = [change for _, change in _changes(worse, better) if (change.ratio or 0.0) < 1.0]
+    if not by_errors or not known:
+        return ""
     tested = [each for each in known if each.chance is not None]
     if tested:
         sure = sum(not each.may_be_chance for each in tested)
+        if not sure:
+            return "; which may be chance (at 5 %)"
         which = "more than" if sure == len(tested) else f"{sure} of {len(tested)} more than"
         return f"; {which} chance (at 5 %)"
     pairs = [each for each in known if each.pairs]

@@ -76,3 +76,11 @@ def test_what_is_no_condition_is_refused(text: str) -> None:
 
 def test_a_condition_is_kept_as_it_was_given() -> None:
     assert parsed_condition(" v1>=2 ") == Condition("v1>=2", "ratio", "v1", ">=", 2.0)
+
+
+def test_a_group_fails_whose_runs_broke_down() -> None:
+    sound = group("sound", *({"x": 1.0} for _ in range(3)))
+    for broken in (group("broken", {"x": 1.0}, {}, {}), group("fewer", {"x": 1.0}, {})):
+        (failure,) = failures_of([parsed_condition("x > 1.1")], [sound, broken])
+        assert (failure.group, failure.value) == (broken.label, None)
+    assert not failures_of([parsed_condition("x > 1.1")], [group("fewer", {"x": 1.0}, {}), sound])
