@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import contextlib
 import json
 import statistics
 import subprocess
@@ -19,7 +20,7 @@ import urllib.request
 from pathlib import Path
 
 from tornado.httpclient import HTTPRequest
-from tornado.websocket import websocket_connect
+from tornado.websocket import WebSocketClosedError, websocket_connect
 
 KINDS = ("no page", "nobody looks", "looked at")
 _SETTINGS = ("mocap.rate_hz=240", "mocap.latency_s=0")
@@ -34,7 +35,8 @@ async def look(host: str) -> None:
     while (text := await socket.read_message()) is not None:
         number, found, _ = str(text)[5:24].partition(",")
         if found and number.isdecimal():
-            await socket.write_message(f'{{"say":"seen","frame":{number}}}')
+            with contextlib.suppress(WebSocketClosedError):
+                await socket.write_message(f'{{"say":"seen","frame":{number}}}')
 
 
 def run(kind: str, duration_s: float, folder: Path) -> dict[str, float]:

@@ -32,7 +32,7 @@ def judge_run(log: Log, scenario: Scenario, folder: Path, figures: Kind | None =
     with doing("judging"):
         runs = [run_data_of_link(log, link) for link in links_of(scenario)]
         summary = summarise_chain(scenario, runs)
-        _write(scenario, runs, summary, folder, "run.png", figures)
+        leave_chain(scenario, runs, summary, folder, "run.png", figures)
     print_chain(summary)
     say(results_in(folder))
     return summary
@@ -52,7 +52,7 @@ def leave_replay(
     summary = done.summary
     print_fed(log, *done.played)
     if out is not None:
-        _write(done.scenario, done.runs, summary, made_folder(out), "replay.png", figures)
+        leave_chain(done.scenario, done.runs, summary, made_folder(out), "replay.png", figures)
         for run_data in done.runs:
             write_estimates(evaluated(run_data), out / f"estimates-{run_data.scenario.follower.name}.csv")
     print_chain(summary)
@@ -66,14 +66,15 @@ def leave_replay(
         _refuse_violated(log, summary)
 
 
-def _write(
+def leave_chain(
     scenario: Scenario,
     runs: Sequence[RunData],
     summary: dict[str, Any],
     folder: Path,
     picture: str,
-    figures: Kind | None,
+    figures: Kind | None = None,
 ) -> None:
+    """Write the summary of a chain's followers, its picture by the given name, and its report."""
     write_json(summary, folder / "summary.json")
     trajectory = driven_trajectory(runs)
     with left_out_if_missing("report.html"):

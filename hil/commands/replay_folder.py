@@ -82,20 +82,22 @@ def refuse_for_folder(folder: Path, options: dict[str, object]) -> None:
 
 def _report_worst(result: dict[str, Any], choice: ReplayChoice, place: Path) -> None:
     """Write reports of the worst logs, and note in their rows where they are."""
+    from hil.commands.chain_results import leave_chain
     from hil.judge.replayed import replayed
     from hil.log.opened import opened_log
 
     rows = {row["log"]: row for row in result["logs"]}
     for number, worst in enumerate(result["worst"][:_REPORTS], 1):
         row = rows[worst["log"]]
-        if "pairs" in row["summary"]:
-            continue  # a page is made of one follower at a time
         try:
             done = replayed(opened_log(Path(result["folder"]) / row["log"]), choice)
         except AbreastError:
             continue
         kept = made_folder(place / f"worst-{number}")
-        leave(done.runs[0], done.summary, kept, "replay.png")
+        if "pairs" in done.summary:
+            leave_chain(done.scenario, done.runs, done.summary, kept, "replay.png")
+        else:
+            leave(done.runs[0], done.summary, kept, "replay.png")
         row["report"] = f"{kept.name}/report.html"
 
 

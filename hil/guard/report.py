@@ -53,8 +53,9 @@ def values_of(guard: RobotGuard, now: Now) -> dict[str, object]:
 def _findings(guard: RobotGuard) -> dict[str, str]:
     found = {}
     if guard.gaps:
+        count = "once" if guard.gaps == 1 else f"{guard.gaps} times"
         found["command_gaps"] = (
-            f"fresh commands failed to come {guard.gaps} times, for {guard.longest_gap_s:.2f} s at most; "
+            f"fresh commands failed to come {count}, for {guard.longest_gap_s:.2f} s at most; "
             f"expected one every {guard.rules.age_s:g} s at least"
         )
     # A stop is an order, and nothing that is wrong.

@@ -221,7 +221,7 @@ function told() {
     for (const each of node.findings) items.push([`bad${node.age_s + later > SILENT_S ? " stale" : ""}`, `${node.name}: ${each.name}: ${each.text}`, each.advice]);
     if (node.age_s + later > SILENT_S) items.push(["bad", `${node.name} has said nothing for ${seconds(node.age_s + later)}.`]);
   }
-  if (reports.malformed) items.push(["", `${reports.malformed} messages could not be read.`]);
+  if (reports.malformed) items.push(["", `${reports.malformed} message${reports.malformed === 1 ? "" : "s"} could not be read.`]);
   const refused = Object.entries(reports.refused).map(([cause, count]) => `${count} by ${cause}`).join(", ");
   if (refused) items.push(["", `This page refused requests: ${refused}.`]);
   list($("against"), items.length ? items : [["good", "Nothing."]], ([name, text, advice]) => {

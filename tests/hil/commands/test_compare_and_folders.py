@@ -11,7 +11,9 @@ import pytest
 
 from hil.command_line import main
 from hil.commands import replay_folder
-from tests.reference_logs import path_of
+from hil.lockstep.run import run_lockstep
+from hil.scenario.files import load_scenario
+from tests.reference_logs import SHORT, path_of
 
 
 def abreast(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
@@ -95,6 +97,24 @@ def test_a_folder_of_logs_is_judged_to_its_end(capsys: pytest.CaptureFixture[str
     assert (tmp_path / "again" / "results.parquet").is_file()
     code, out, _ = abreast(capsys, "compare", tmp_path / "logs-out", tmp_path / "again", "--json")
     assert json.loads(out)["verdict"].get("best") is None, "what is the same is alike"
+
+
+def test_a_chain_among_the_worst_has_a_page_of_all_its_followers(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    shutil.copy(PLAIN, logs / "pair.mcap")
+    run_lockstep(load_scenario("chain5-turtlebot3", (*SHORT, "mocap.sigma_position=0.01")), logs / "row.mcap")
+    code, out, _ = abreast(capsys, "replay", logs, "--workers", "1", "--json")
+    assert code == 0
+    row = next(each for each in json.loads(out)["logs"] if each["log"] == "row.mcap")
+    page = (tmp_path / "logs-out" / row["report"]).read_text()
+    assert "What each follower did" in page
+    summary = json.loads((tmp_path / "logs-out" / row["report"]).with_name("summary.json").read_text())
+    assert [pair["follower"] for pair in summary["pairs"]] == [
+        pair["follower"] for pair in row["summary"]["pairs"]
+    ]
 
 
 def test_figures_of_a_folder_of_logs_are_refused_with_their_reason(
