@@ -12,6 +12,9 @@ from hil.commands.page_options import page_options
 from hil.commands.wire_options import endpoints_of, wire_options
 from hil.log.report_json import note
 
+_NICENESS = 5
+"""Of the page beside a run: it shows a lab, and whoever drives in it goes first."""
+
 
 @click.command("live", params=[*page_options(), *wire_options(listens=False)])
 @click.argument("scenario", default="turtlebot3")
@@ -34,6 +37,7 @@ def command(
     printed has a token, without which nobody sees or stops anything.
     """
     from hil.live.daemon import Ending
+    from hil.live.priority import step_aside
     from hil.live_page.admission import Admission
     from hil.live_page.live_page import LivePage
     from hil.live_page.serving import (
@@ -57,6 +61,7 @@ def command(
     ending.on_signals()
     if tethered:
         ending.on_parent_gone()
+        step_aside(_NICENESS)
     if listening is not None:
         held = socket.socket(fileno=listening)
     else:

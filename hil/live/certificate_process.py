@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import tomllib
 
+from hil.live.priority import step_aside
 from hil.log.metadata import certificate_metadata
 from hil.scenario.files import build_scenario, scenario_text
 from hil.scenario.schema import Scenario
@@ -55,7 +55,7 @@ class CertificateProcess:
 
 
 def _certify(niceness: int) -> None:
-    os.nice(niceness)
+    step_aside(niceness)
     from hil.log.report_json import as_json
     from hil.scenario.certificate import certificate_json, certificate_of
 
