@@ -38,11 +38,13 @@ def command(paths: tuple[Path, ...], conditions: tuple[str, ...], out: Path | No
     from hil.compare.comparison_text import comparison_text
     from hil.compare.conditions import failures_of, parsed_condition
     from hil.compare.gathering import groups_of
+    from hil.compare.noise_table import noise_rows
 
     parsed = [parsed_condition(text) for text in conditions]
     groups = groups_of(paths)
     comparison = compared(groups, failures_of(parsed, groups))
-    say(comparison_text(comparison))
+    where = "with --json" if out is None else f"in {out / 'compare.html'}"
+    say(comparison_text(comparison, noise_rows(comparison), where))
     if out is not None:
         write_json(comparison.as_json(), made_folder(out) / "compare.json")
         with left_out_if_missing("compare.html"):

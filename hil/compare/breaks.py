@@ -105,7 +105,7 @@ def _untracked(group: Group) -> Break | None:
         return None
     lost = sum(sum(group.values(name)) for name in names)
     tracked = sum(sum(group.values(_beside(name, inner))) for name, inner in names.items())
-    return Break("estimates that did not say tracking", lost, lost + tracked, group.runs, _TRACK)
+    return Break("untracked estimates", lost, lost + tracked, group.runs, _TRACK)
 
 
 def _outside(group: Group, pattern: str) -> Break | None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from hil.compare.change import Change, change_of
 from hil.compare.conditions import Failure
+from hil.compare.differences import Differences, differences_of
 from hil.compare.group import RUNS, Group, Spread
 from hil.compare.metrics import HEADLINES, goal_of, in_order
 from hil.compare.verdict import Verdict, verdict_on
@@ -22,7 +23,7 @@ class Comparison:
     """Groups, how their conditions differ (values of each group by key), and which was better."""
 
     groups: tuple[Group, ...]
-    differences: dict[str, tuple[tuple[str, ...], ...]]
+    differences: Differences
     verdict: Verdict
     notes: tuple[str, ...]
     failures: tuple[Failure, ...]
@@ -33,8 +34,7 @@ class Comparison:
 
     def spread(self, name: str, group: Group) -> Spread | None:
         """Spread of a metric in a group, None where it is not known there."""
-        values = group.values(name)
-        return Spread.of(values) if values else None
+        return group.spread(name)
 
     def change(self, name: str, group: Group) -> Change | None:
         """How a metric changed from the first group."""
@@ -81,14 +81,6 @@ def compared(groups: Sequence[Group], failures: Sequence[Failure] = ()) -> Compa
     )
 
 
-def differences_of(groups: Sequence[Group]) -> dict[str, tuple[tuple[str, ...], ...]]:
-    """Conditions whose values are not the same in all groups; empty values for a group that knows none."""
-    facts = [group.facts() for group in groups]
-    keys = dict.fromkeys(key for each in facts for key in each)
-    values = {key: tuple(each.get(key, ()) for each in facts) for key in keys}
-    return {key: each for key, each in values.items() if len(set(map(frozenset, each))) > 1}
-
-
 def shortened(values: Sequence[str]) -> str:
     """Values of a condition in a few words."""
     if not values:
@@ -100,11 +92,14 @@ def shortened(values: Sequence[str]) -> str:
 _NOISE = ("mocap.", "robot.", "leader.", "run.duration_s", "duration_s")
 
 
-def _notes(groups: Sequence[Group], differences: dict[str, tuple[tuple[str, ...], ...]]) -> list[str]:
+def _notes(groups: Sequence[Group], differences: Differences) -> list[str]:
     notes = [note for group in groups for note in group.notes]
     notes += _gone(groups)
     if len({tuple(sample.runs for sample in group.samples) for group in groups if group.kind != RUNS}) > 1:
-        notes.append("they did not do as many runs of each cell; counts are compared as shares of these")
+        notes.append(
+            "they did not do as many runs of each cell: counts are compared as shares of these, and errors "
+            "of few runs scatter; sweep both with the same --runs"
+        )
     harder = [key for key in differences if key.startswith(_NOISE)]
     if harder:
         named = ", ".join(harder[:_MOST_VALUES]) + (" and more" if len(harder) > _MOST_VALUES else "")

@@ -5,13 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from hil.compare.change import Change
 from hil.compare.comparison import Comparison, shortened
 from hil.compare.group import Group, Spread
 from hil.compare.metrics import is_told, shown, unit_of
 
+_ALIKE = 0.005
+"""Share by which values differ that are shown as a ratio of 1."""
 
-def comparison_text(comparison: Comparison) -> str:
-    """All of it as text, a line each."""
+
+def comparison_text(comparison: Comparison, further: Sequence[Sequence[str]] = (), where: str = "") -> str:
+    """All of it as text, a line each.
+
+    ``further``: rows of a table more, the header first. ``where`` all metrics are to be had.
+    """
     lines = [comparison.verdict.text, *(f"! {note}" for note in comparison.notes), ""]
     groups = comparison.groups
     header = ["", *(f"{group.label} ({group.noun()})" for group in groups)]
@@ -23,11 +30,13 @@ def comparison_text(comparison: Comparison) -> str:
     told = [name for name in comparison.metrics() if is_told(name)]
     same = [name for name in told if is_same(comparison, name)]
     rows = [metric_row(comparison, name) for name in told if name not in same]
+    if further:
+        lines += [*_aligned(further, right=True), ""]
     lines += _aligned([["median (quartiles)", *_with_change(header[1:])], *rows], right=True)
     if same:
         lines.append(f"the same in all: {', '.join(same)}")
     if more := sum(not is_told(name) for name in comparison.metrics()):
-        lines.append(f"{more} metrics more with --json and in compare.html")
+        lines.append(f"{more} metrics more {where}".rstrip())
     return "\n".join(lines)
 
 
@@ -47,22 +56,27 @@ def metric_row(comparison: Comparison, name: str) -> list[str]:
 
 def change_text(comparison: Comparison, name: str, group: Group) -> str:
     """By how much a metric changed from the first group, whether that is better, and whether it is chance."""
-    change = comparison.change(name, group)
+    return told_ratio(name, comparison.change(name, group))
+
+
+def told_ratio(name: str, change: Change | None) -> str:
+    """A change in a few words."""
     if change is None:
         return "–"
     if change.same:
         return "same"
+    alike = change.ratio is not None and abs(change.ratio - 1.0) < _ALIKE
     if change.ratio is not None and math.isfinite(change.ratio):
-        told = f"× {change.ratio:.3g}"
+        told = "about the same" if alike else f"× {change.ratio:.3g}"
     else:
         told = f"{'+' * (change.difference > 0.0)}{shown(name, change.difference)}"
-    if change.better is None and change.pairs:
-        counts = (("better", change.better_in), ("worse", change.worse_in))
-        told += ",".join(f" {word} {count}/{change.pairs}" for word, count in counts if count)
-    if change.better is not None:
-        told += " better" if change.better else " worse"
-    if change.better is not None and change.pairs:
-        told += f" {change.better_in if change.better else change.worse_in}/{change.pairs}"
+    counts = {"better": change.better_in, "worse": change.worse_in}
+    if change.pairs > 1 and (alike or change.better is None):
+        found = [f"{word} {count}/{change.pairs}" for word, count in counts.items() if count]
+        told += "".join(f", {each}" for each in found)
+    elif change.better is not None and not alike:
+        word = "better" if change.better else "worse"
+        told += f" {word} {counts[word]}/{change.pairs}" if change.pairs > 1 else f" {word}"
     return told + (", chance?" if change.may_be_chance else "")
 
 

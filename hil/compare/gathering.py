@@ -13,6 +13,7 @@ from typing import Any
 from hil.compare.group import RUNS, SWEEP, Group, Sample
 from hil.compare.metrics import metrics_of
 from hil.errors import AbreastError, UsageError
+from hil.extensions.reference import is_reference, short
 from hil.judge.made_by import law_name
 from hil.log.bag_folder import in_order
 from hil.log.description import RECORD
@@ -22,6 +23,7 @@ from hil.log.reader import Log
 from hil.log.report_json import flat
 from hil.reports.sweep_cells import estimators_of, is_known, point_of
 
+_NO_FACTS = ("grid", "description", "set")
 _EXPECTED = (
     "expected the folder of a run (summary.json), of a sweep or of judged logs (results.json), of many "
     "of these, or a log"
@@ -110,9 +112,12 @@ def _of_results(path: Path, file: Path, label: str) -> Group:
     cells: Sequence[Mapping[str, Any]] = tree.get("cells", [])
     if not cells:
         raise UsageError(f"{path}: its results.json has no cells; nothing to compare")
-    spec = {key: value for key, value in tree.get("spec", {}).items() if key not in ("grid", "description")}
+    spec = {key: value for key, value in tree.get("spec", {}).items() if key not in _NO_FACTS}
     told = flat({**spec, "version": tree.get("version")})
     facts = {key: _text(value) for key, value in told if value is not None}
+    for override in tree.get("spec", {}).get("set", ()):
+        key, _, value = str(override).partition("=")
+        facts[key] = short(value) if key == "controller.law" and is_reference(value) else value
     asked, _ = estimators_of(cells)
     samples = [
         _cell(number, cell, facts, len(asked) == 1)
@@ -130,7 +135,9 @@ def _cell(number: int, cell: Mapping[str, Any], facts: Mapping[str, str], alone:
     """A cell; of a single estimator it is the same whichever that is."""
     key = point_of(cell) if alone else f"{cell['estimator']} at {point_of(cell)}"
     metrics = metrics_of(cell) if is_known(cell) else {"diverged": float(cell["diverged"])}
-    return Sample(f"cell {number}", key, metrics, facts, runs=int(cell["runs"]))
+    return Sample(
+        f"cell {number}", key, metrics, facts, runs=int(cell["runs"]), noise=cell.get("sigma_position")
+    )
 
 
 def _judged(root: Path, each: Mapping[str, Any]) -> Sample:

@@ -22,7 +22,8 @@ class Sample:
     run or the point of a cell; empty where nothing is known. ``metrics`` by dotted names. ``facts``: under
     which conditions, as text by the scenario's keys. ``log``: where its log is, None if it is not there.
     ``estimates``: a table of estimates that take the place of those in the log. ``runs``: how many it is of.
-    ``lost``: metrics of a cell that have no part, as a cell of another sweep at its place lacks them.
+    ``noise``: of positions in a cell [m]. ``lost``: metrics of a cell that have no part, as a cell of another
+    sweep at its place lacks them.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Sample:
     log: Path | None = None
     estimates: Path | None = None
     runs: int = 1
+    noise: float | None = None
     lost: frozenset[str] = frozenset()
 
     @property
@@ -81,6 +83,11 @@ class Group:
         """Values of a metric, of the samples that have it; of a sweep's counts their sum alone."""
         values = [sample.metrics[name] for sample in self.samples if name in sample.metrics]
         return [sum(values)] if values and self.adds_up(name) else values
+
+    def spread(self, name: str) -> Spread | None:
+        """Spread of a metric, None where no sample knows it."""
+        values = self.values(name)
+        return Spread.of(values) if values else None
 
     def adds_up(self, name: str) -> bool:
         """Whether a metric is a count of a sweep's cells, whose sum is what matters."""

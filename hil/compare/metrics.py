@@ -55,6 +55,7 @@ _GOALS = {
     "formation.orbit_deviation_rms.*": Goal(LOWER),
     "formation.equilibrium_deviation_rms.*": Goal(LOWER),
     "formation.deviation.*": Goal(LOWER),
+    "formation.equilibrium_deviation.*": Goal(LOWER),
     "formation.certified": Goal(HIGHER),
     "latency_ms.*": Goal(LOWER),
     "cycles.late": Goal(LOWER),
@@ -79,13 +80,18 @@ _GOALS = {
 }
 """Those of summaries, then those of a sweep's cells; of a metric that is not here nobody can say."""
 
+OFF_RUN = frozenset({"formation.orbit_deviation_rms.rho", "formation.deviation.rho"})
+OFF_STATION = frozenset({"formation.equilibrium_deviation_rms.rho", "formation.equilibrium_deviation.rho"})
+"""How well the formation was kept, of runs and of cells: against what the law does by itself, and at all."""
+
 HEADLINES = {
     **RUN_HEADLINES,
     "rmse.v1": "RMSE of v1",
     "rmse.alpha1": "RMSE of alpha1",
-    "formation.deviation.rho": "rho off the noise-free run",
+    **dict.fromkeys(sorted(OFF_RUN), "rho off its own noise-free run"),
+    **dict.fromkeys(sorted(OFF_STATION), "rho off the station"),
 }
-"""What a verdict is about, in its words, and what is told first."""
+"""What a verdict may be about, in its words, and what is told first."""
 
 BROKEN = {
     "bounds.violations.*_extended": "samples outside an extended bound",
@@ -110,6 +116,7 @@ _FIRST = (
     "bounds.published.median.alpha1",
     *UNTRACKED,
     "formation.orbit_deviation_rms.*",
+    "formation.equilibrium_deviation_rms.*",
     "formation.rho_min",
     "formation.rho_max",
     "formation.certified",
@@ -178,7 +185,7 @@ def unit_of(name: str) -> tuple[str, float]:
     over = above[-1] if above else ""
     if last in QUANTITIES and over in ("rmse", "max", "median"):
         return QUANTITIES[last][1], scale_of(last)
-    if over in ("orbit_deviation_rms", "equilibrium_deviation_rms", "deviation"):
+    if over in ("orbit_deviation_rms", "equilibrium_deviation_rms", "deviation", "equilibrium_deviation"):
         return ("deg", math.degrees(1.0)) if last.startswith("alpha") else ("mm", 1e3)
     if above and above[0] == "formation" and last.startswith(("rho", "alpha")):
         return ("deg", math.degrees(1.0)) if last.startswith("alpha") else ("m", 1.0)

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from hil.compare.breaks import Break, breaks_of, least_broken, parting, told_parting
 from hil.compare.change import Change, change_of
 from hil.compare.group import SWEEP, Group, Spread
-from hil.compare.metrics import HEADLINES, in_order, shown, unit_of
+from hil.compare.headlines import Headlines
+from hil.compare.metrics import HEADLINES, shown, unit_of
 from hil.judge.dotted_figures import bare
 
 _NEGLIGIBLE = 0.02
@@ -27,7 +28,8 @@ class Verdict:
 def verdict_on(groups: Sequence[Group]) -> Verdict:
     """The better group and why: by what should not be at all, else by the errors of the headlines."""
     first, *others = groups
-    scores = [0.0, *(_score(first, other) for other in others)]
+    headlines = Headlines.of(groups)
+    scores = [0.0, *(_score(first, other, headlines) for other in others)]
     breaks = breaks_of(groups)
     best = _best(range(len(groups)), breaks, scores)
     next_best = 0
@@ -39,13 +41,14 @@ def verdict_on(groups: Sequence[Group]) -> Verdict:
     decided = parting(breaks[best], breaks[next_best])
     gap = (scores[next_best] or 0.0) - (scores[best] or 0.0)
     if decided is None and not gap > _NEGLIGIBLE:
-        return Verdict(None, f"{better.label} and {worse.label} are alike{_but(worse, better)}.")
+        return Verdict(None, f"{better.label} and {worse.label} are alike{_but(worse, better, headlines)}.")
     which = f"better than {worse.label}"
     if len(groups) > 2:
         which = f"the best of {len(groups)}, {'ahead of' if best == 0 else 'against'} {worse.label}"
     because = "" if decided is None else told_parting(*decided)
-    reasons = "; ".join(filter(None, [because, _reasons(worse, better)]))
-    trust = _trust(worse, better, by_errors=decided is None)
+    reasons = "; ".join(filter(None, [because, _reasons(worse, better, headlines)]))
+    changes = [change for _, change in _changes(worse, better, headlines)]
+    trust = _trust(worse, better, changes, by_errors=decided is None)
     return Verdict(better.label, f"{better.label} was {which}: {reasons}{trust}.")
 
 
@@ -60,24 +63,22 @@ def _best(
     return min(known)[1] if len(known) == len(left) else None
 
 
-def _score(first: Group, other: Group) -> float | None:
-    """Mean of the logarithms of ratios of the headlines' metrics; None where none is known of both."""
+def _score(first: Group, other: Group, headlines: Headlines) -> float | None:
+    """Mean of the logarithms of ratios of the metrics that decide; None where none is known of both."""
     ratios = []
-    for name in _headlines(first, other):
+    for name in headlines.deciding(first, other):
         change = change_of(name, first, other)
         if change is not None and change.ratio is not None and 0.0 < change.ratio < math.inf:
             ratios.append(math.log(change.ratio))
     return sum(ratios) / len(ratios) if ratios else None
 
 
-def _headlines(first: Group, other: Group) -> list[str]:
-    return in_order({name for name in first.metrics & other.metrics if bare(name) in HEADLINES})
-
-
-def _reasons(worse: Group, better: Group) -> str:
-    """Headlines with their change, those that speak for the better one first."""
+def _reasons(worse: Group, better: Group, headlines: Headlines) -> str:
+    """Headlines with their change, those that speak for the better one first, and of these what decides."""
+    found = _changes(worse, better, headlines)
     told = [
-        (change.ratio or 0.0, _told(name, worse, better, change)) for name, change in _changes(worse, better)
+        (change.ratio or 0.0, _told(name, worse, better, change))
+        for name, change in sorted(found, key=lambda each: bare(each[0]) not in headlines.decide)
     ]
     gains = [text for ratio, text in told if ratio <= 1.0]
     losses = [text for ratio, text in told if ratio > 1.0]
@@ -86,9 +87,9 @@ def _reasons(worse: Group, better: Group) -> str:
     return ", ".join(gains or losses)
 
 
-def _changes(worse: Group, better: Group) -> list[tuple[str, Change]]:
+def _changes(worse: Group, better: Group, headlines: Headlines) -> list[tuple[str, Change]]:
     """Headlines that changed by more than is negligible."""
-    found = [(name, change_of(name, worse, better)) for name in _headlines(worse, better)]
+    found = [(name, change_of(name, worse, better)) for name in headlines.told_of(worse, better)]
     return [
         (name, change)
         for name, change in found
@@ -98,8 +99,8 @@ def _changes(worse: Group, better: Group) -> list[tuple[str, Change]]:
     ]
 
 
-def _but(first: Group, second: Group) -> str:
-    reasons = _reasons(first, second)
+def _but(first: Group, second: Group, headlines: Headlines) -> str:
+    reasons = _reasons(first, second, headlines)
     return f" on the whole: in {second.label} {reasons}" if reasons else ""
 
 
@@ -114,13 +115,13 @@ def _told(name: str, worse: Group, better: Group, change: Change) -> str:
     return f"{HEADLINES[bare(name)]}{whose} {values} ({percent})"
 
 
-def _trust(worse: Group, better: Group, *, by_errors: bool) -> str:
+def _trust(worse: Group, better: Group, changes: Sequence[Change], *, by_errors: bool) -> str:
     """How far chance may have done what speaks for the better one; of errors alone."""
     if better.kind == SWEEP:  # cells share their seeds
         return ""
     if min(len(worse.samples), len(better.samples)) == 1:
         return "; with one run on a side the spread is not known"
-    known = [change for _, change in _changes(worse, better) if (change.ratio or 0.0) < 1.0]
+    known = [change for change in changes if (change.ratio or 0.0) < 1.0]
     if not by_errors or not known:
         return ""
     tested = [each for each in known if each.chance is not None]

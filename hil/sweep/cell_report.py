@@ -22,7 +22,8 @@ def report_cell(cell: Cell, tallies: NDArray[np.void], allowed: tuple[float, flo
     RMSE over the root mean square of the posterior Cramer-Rao bound, which is that for random leaders.
     ``nees``: over all samples too; ``nees_limits``: those of deviations that are right, by how the runs,
     which are independent, differ among themselves. ``tightness``: the largest of all runs.
-    ``formation.deviation``: RMS off the noise-free run. ``formation.certified``: share of moments at which
+    ``formation.deviation``: RMS off the noise-free run of the same law; ``formation.equilibrium_deviation``:
+    off the station, as one law is told from another by. ``formation.certified``: share of moments at which
     the distance was in the certificate's set; absent where it has none. ``worst_run``: the one that came
     nearest to its extended bounds, among those that diverged if there are any. ``law_failed``: runs in which
     a law of one's own failed, absent for none.
@@ -59,6 +60,10 @@ def report_cell(cell: Cell, tallies: NDArray[np.void], allowed: tuple[float, flo
                 "deviation": {
                     "rho": _root(sum(tallies["rho_off_sum"].tolist()), moments),
                     "alpha1": _root(sum(tallies["alpha1_off_sum"].tolist()), moments),
+                },
+                "equilibrium_deviation": {
+                    "rho": _root(sum(tallies["rho_station_sum"].tolist()), moments),
+                    "alpha1": _root(sum(tallies["alpha1_station_sum"].tolist()), moments),
                 },
                 "certified": int(tallies["inside"].sum()) / moments if allowed and moments else None,
             },

@@ -21,10 +21,12 @@ from hil.judge.columns import Columns, CommandColumns, EstimateColumns, inside
 from hil.judge.estimation import WARM_UP_NS, estimate_errors, least_deviations
 from hil.judge.noise_free_orbit import NoiseFreeOrbit, noise_free_orbit
 from hil.judge.run_data import Span, judged_from_ns
+from hil.judge.side_orders import Order, desired_bearings
 from hil.judge.true_states import TrueStates
 from hil.lockstep.flyer import Flown, Flyer
 from hil.scenario.files import build_scenario, scenario_text, with_overrides
 from hil.scenario.links import links_of
+from hil.scenario.ordered_sides import ordered_sides
 from hil.scenario.schema import Scenario
 
 BOUNDS = tuple(QUANTITY_OF)
@@ -50,6 +52,8 @@ TALLY = np.dtype(
         ("rho_max", _MEASURE),
         ("rho_off_sum", _MEASURE),
         ("alpha1_off_sum", _MEASURE),
+        ("rho_station_sum", _MEASURE),
+        ("alpha1_station_sum", _MEASURE),
         ("law_failed", _COUNT),
     ]
 )
@@ -100,6 +104,7 @@ def judge_run(
         _add_distances(tally, columns)
         if k == 0:
             _add_formation(tally, columns, allowed, orbit)
+            _add_station(tally, link.scenario, columns)
     return tally
 
 
@@ -210,6 +215,15 @@ def _add_formation(
     orbit_rho, orbit_alpha1, _ = orbit.at(truth.capture_ns[near])
     tally["rho_off_sum"] = np.sum((rho - orbit_rho) ** 2)
     tally["alpha1_off_sum"] = np.sum(wrap(alpha1 - orbit_alpha1) ** 2)
+
+
+def _add_station(tally: NDArray[np.void], scenario: Scenario, columns: Columns) -> None:
+    truth = columns.truth
+    near = inside(truth.capture_ns, columns.span)
+    orders = [Order(round(at_s * 1e9), side) for at_s, side in ordered_sides(scenario)]
+    alpha1, _ = desired_bearings(scenario, orders, truth.capture_ns[near])
+    tally["rho_station_sum"] = np.sum((truth.rho[near] - scenario.formation.rho_0) ** 2)
+    tally["alpha1_station_sum"] = np.sum(wrap(truth.alpha1[near] - alpha1) ** 2)
 
 
 def orbit_of(scenario: Scenario) -> NoiseFreeOrbit | None:
