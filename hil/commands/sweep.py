@@ -33,6 +33,9 @@ from hil.sweep.spec import Sweep, load_sweep
 @click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a scenario key in all cells."
 )
+@click.option(
+    "--grid", "axes", multiple=True, metavar="AXIS=A,B,...", help="Values of an axis in place of SPEC's."
+)
 @click.option("--workers", type=Whole(1), metavar="N", help="Processes [as many as there are processors].")
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Dask scheduler to send the work to, like tcp://host:8786."
@@ -55,6 +58,7 @@ def command(
     estimators: str | None,
     law: str | None,
     overrides: tuple[str, ...],
+    axes: tuple[str, ...],
     workers: int | None,
     scheduler: str | None,
     kept: tuple[str, ...],
@@ -74,7 +78,7 @@ def command(
     names = None if estimators is None else [name.strip() for name in estimators.split(",")]
     if law is not None:
         overrides = (*overrides, f"controller.law={law}")
-    sweep = load_sweep(spec, overrides, runs=runs, seed=seed, duration_s=duration, estimators=names)
+    sweep = load_sweep(spec, overrides, axes, runs=runs, seed=seed, duration_s=duration, estimators=names)
     for point in sweep.cells()[: len(sweep.spec.estimators)]:
         load_own_parts(sweep.scenario_of(point))
     to_keep = [_parsed(sweep, text) for text in kept if text != "worst"]

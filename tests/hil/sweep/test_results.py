@@ -83,6 +83,8 @@ def test_a_cell_of_one_run_has_the_figures_of_its_lockstep_run(
         formation = wanted["formation"]
         assert found["formation"]["rho_max"] == pytest.approx(formation["rho_max"], rel=1e-9)
         assert found["formation"]["deviation"] == pytest.approx(formation["orbit_deviation_rms"], rel=1e-3)
+        off_station = formation["equilibrium_deviation_rms"]
+        assert found["formation"]["equilibrium_deviation"] == pytest.approx(off_station, rel=1e-3)
 
 
 def test_every_sound_and_extended_bound_holds_over_a_grid_of_noise(

@@ -1,0 +1,50 @@
+"""Axes from a command line: they take the place of the grid's, and no key of theirs is lost in silence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from hil.errors import UsageError
+from hil.sweep.spec import Sweep, load_sweep
+
+
+def test_an_axis_takes_the_place_of_the_grids() -> None:
+    sweep = load_sweep("default", axes=["sigma_position=0.001,0.007", "loss=0.3"])
+    assert {cell.sigma_position for cell in sweep.cells()} == {0.001, 0.007}
+    assert {cell.loss for cell in sweep.cells()} == {0.3}
+    assert {cell.latency_s for cell in sweep.cells()} == {
+        cell.latency_s for cell in load_sweep("default").cells()
+    }
+
+
+def test_parameters_of_a_law_are_an_axis(make_sweep: Callable[..., Sweep], tmp_path: object) -> None:
+    (law := f"{tmp_path}/turning.py:turning")
+    with open(law.partition(":")[0], "w", encoding="utf-8") as file:
+        file.write("def turning(shape, leader, gains):\n    return leader.v1, gains.k\n")
+    sweep = load_sweep("noise", [f"controller.law={law}"], ["parameters.k=0,0.5"], runs=1)
+    assert [dict(cell.parameters)["k"] for cell in sweep.cells()[:2]] == [0.0, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("override", "instead"),
+    [
+        ("mocap.sigma_position=0.002", "--grid sigma_position=0.002"),
+        ("estimator.sigma_heading=0.01", "--grid sigma_heading=0.01"),
+        ("mocap.loss=0.1", "--grid loss=0.1"),
+        ("estimator.kind=ukf", "--estimators A,B"),
+        ("run.seed=3", "--seed N"),
+        ("run.duration_s=5", "--duration S"),
+    ],
+)
+def test_a_key_that_every_cell_sets_is_refused_with_what_to_give(override: str, instead: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        load_sweep("default", [override])
+    assert instead in str(caught.value)
+
+
+@pytest.mark.parametrize("axis", ["sigma_position", "sigma_position=", "=0.1", "loss=few", "noise=0.1"])
+def test_what_is_no_axis_is_refused(axis: str) -> None:
+    with pytest.raises(UsageError, match="noise|grid"):
+        load_sweep("default", axes=[axis])
