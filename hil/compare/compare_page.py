@@ -8,9 +8,10 @@ from hil.compare.compare_plots import course_panels, span_of, spread_panels
 from hil.compare.comparison import Comparison, shortened
 from hil.compare.comparison_text import is_same, metric_row
 from hil.compare.courses import Course, course_of
+from hil.compare.differences import are_of_the_law
 from hil.compare.group import RUNS
 from hil.compare.metrics import is_told
-from hil.compare.ratio_maps import labels_of_maps, ratio_maps
+from hil.compare.ratio_maps import labels_of_maps, map_labels, ratio_maps
 from hil.reports.heat_maps import SWITCH, choices_html
 from hil.reports.page import Section, Timeline, page, table_html
 from hil.reports.scroll_frame import FRAME_STYLE, framed
@@ -40,8 +41,10 @@ def compare_page(comparison: Comparison) -> str:
         ]
     else:
         first, *others = comparison.groups
-        panels = [panel for group in others for panel in ratio_maps(first, group)]
-        choices = choices_html(first.tree["cells"])
+        cells = first.tree["cells"]
+        shown = map_labels(cells, laws_differ=are_of_the_law(comparison.differences))
+        panels = [panel for group in others for panel in ratio_maps(first, group, list(shown))]
+        choices = choices_html(cells, shown)
         words = f"<p>{choices}</p>\n{labels_of_maps(first)}"
         sections.insert(0, Section("Errors over noise", words, panels, narrow=True))
     labels = " · ".join(group.label for group in comparison.groups)

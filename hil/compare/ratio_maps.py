@@ -8,7 +8,15 @@ from html import escape
 
 from hil.compare.group import Group
 from hil.reports.cell_looks import ABSENT, DIVERGED, LOOKS, Look, ink_on, marked_lost
-from hil.reports.heat_maps import noise_labels, noise_map, quantities_of, slice_of, slices_of
+from hil.reports.heat_maps import (
+    noise_labels,
+    noise_map,
+    off_run,
+    off_station,
+    quantity_labels,
+    slice_of,
+    slices_of,
+)
 from hil.reports.plots import Panel
 from hil.reports.sweep_cells import Cell, estimators_of, is_sound, number, point_of
 
@@ -26,15 +34,35 @@ LEGEND = (
 )
 
 
-def ratio_maps(first: Group, other: Group) -> list[Panel]:
-    """One map for every estimator of another sweep: its RMSE over that of the first, where both have a cell.
+STATION, OWN_RUN = "station", "own_run"
+_FORMATION = {
+    STATION: ("ρ off the station [mm]", off_station),
+    OWN_RUN: ("ρ off its own noise-free run [mm]", off_run),
+}
 
-    Cells with runs that diverged in one of the two have no colour.
+
+def map_labels(cells: Sequence[Cell], *, laws_differ: bool) -> dict[str, str]:
+    """What maps can show, in words by its key: errors of quantities, and how well the formation was kept.
+
+    The latter first where laws differ: by that they are told apart.
+    """
+    keys = [STATION] if laws_differ else [OWN_RUN, STATION]
+    kept = {
+        key: _FORMATION[key][0] for key in keys if any(_FORMATION[key][1](cell) is not None for cell in cells)
+    }
+    errors = quantity_labels(cells)
+    return {**kept, **errors} if laws_differ else {**errors, **kept}
+
+
+def ratio_maps(first: Group, other: Group, chosen: Sequence[str]) -> list[Panel]:
+    """One map for every estimator of another sweep: its error over that of the first, where both have a cell.
+
+    ``chosen``: keys of what can be chosen, that which is shown at first in front. Cells with runs that
+    diverged in one of the two have no colour.
     """
     before, after = _cells(first), _cells(other)
     _, foils = estimators_of(after)
     rows, columns = noise_labels(after, "sigma_position"), noise_labels(after, "sigma_heading")
-    quantities = quantities_of(before)
     panels = []
     for estimator in dict.fromkeys(str(cell["estimator"]) for cell in after):
         data: dict[str, list[str]] = {
@@ -42,7 +70,7 @@ def ratio_maps(first: Group, other: Group) -> list[Panel]:
             "column": [column for _ in rows for column in columns.values()],
         }
         twins = _twins(before, [cell for cell in after if str(cell["estimator"]) == estimator])
-        for quantity in quantities:
+        for quantity in chosen:
             for n, each in enumerate(slices_of(before)):
                 looks = {
                     (new["sigma_position"], new["sigma_heading"]): _look(old, new, quantity)
@@ -51,10 +79,10 @@ def ratio_maps(first: Group, other: Group) -> list[Panel]:
                 }
                 shown = [looks.get((row, column), ABSENT) for row in rows for column in columns]
                 data |= {f"{name}|{quantity}|{n}": [getattr(look, name) for look in shown] for name in LOOKS}
-        if quantities:
-            data |= {name: data[f"{name}|{quantities[0]}|0"] for name in LOOKS}
+        if chosen:
+            data |= {name: data[f"{name}|{chosen[0]}|0"] for name in LOOKS}
             title = f"{other.label}: {estimator}{' (foil)' * (estimator in foils)}"
-            says = f"RMSE over that of {first.label}; below 1 is better."
+            says = f"Error over that of {first.label}; below 1 is better."
             across, up = list(columns.values()), list(rows.values())
             panels.append(noise_map(title, says, data, up, across, leads=False))
     return panels
@@ -75,8 +103,14 @@ def _twins(before: Sequence[Cell], after: Sequence[Cell]) -> list[tuple[Cell, Ce
     return [(old, new) for old, new in found if old is not None]
 
 
+def _error(cell: Cell, quantity: str) -> float | None:
+    if quantity in _FORMATION:
+        return _FORMATION[quantity][1](cell)
+    return number(cell.get("rmse", {}).get(quantity))
+
+
 def _look(old: Cell, new: Cell, quantity: str) -> Look:
-    errors = [number(cell.get("rmse", {}).get(quantity)) for cell in (old, new)]
+    errors = [_error(cell, quantity) for cell in (old, new)]
     if not (is_sound(old) and is_sound(new)):
         counts = f"{old['diverged']} → {new['diverged']}"
         return marked_lost(

@@ -82,6 +82,39 @@ MERITS = (
 )
 
 
+def off_station(cell: Cell, _: str = "") -> float | None:
+    """How far the distance was off the station [m, RMS], None where that is not known."""
+    return number(cell.get("formation", {}).get("equilibrium_deviation", {}).get("rho"))
+
+
+def off_run(cell: Cell, _: str = "") -> float | None:
+    """The same off the noise-free run of the cell's law."""
+    return number(cell.get("formation", {}).get("deviation", {}).get("rho"))
+
+
+FORMATION = (
+    Merit(
+        "Distance off the station",
+        "RMS of ρ minus ρ₀ [mm], whatever the quantity: by this laws are told apart.",
+        off_station,
+        lambda value, _: f"{1e3 * value:.3g}",
+    ),
+    Merit(
+        "Distance off the noise-free run",
+        "RMS of ρ off what the same law does without noise [mm]: by this estimators are told apart.",
+        off_run,
+        lambda value, _: f"{1e3 * value:.3g}",
+    ),
+)
+"""How well the formation was kept, which is of a cell and of no quantity."""
+
+
+def merits_of(cells: Sequence[Cell]) -> list[Merit]:
+    """Merits of which any cell knows a value."""
+    kept = [merit for merit in FORMATION if any(merit.value(cell, "") is not None for cell in cells)]
+    return [*MERITS, *kept]
+
+
 Slice = tuple[float, float, tuple[tuple[str, float], ...]]
 """Latency [s], loss, and parameters of a law of one's own by name."""
 
@@ -103,11 +136,15 @@ def quantities_of(cells: Sequence[Cell]) -> list[str]:
     return [name for name in QUANTITIES if any(_rmse(cell, name) is not None for cell in cells)]
 
 
-def choices_html(cells: Sequence[Cell]) -> str:
-    """The two lists from which quantity and slice are chosen."""
-    symbols = {name: f"{QUANTITIES[name][0]} [{QUANTITIES[name][1]}]" for name in quantities_of(cells)}
+def quantity_labels(cells: Sequence[Cell]) -> dict[str, str]:
+    """Symbol and unit of each quantity of which any cell knows an error."""
+    return {name: f"{QUANTITIES[name][0]} [{QUANTITIES[name][1]}]" for name in quantities_of(cells)}
+
+
+def choices_html(cells: Sequence[Cell], labels: Mapping[str, str]) -> str:
+    """The two lists from which a slice and what is shown are chosen, the latter by its key."""
     slices = {str(n): slice_name(each) for n, each in enumerate(slices_of(cells))}
-    return _choice("quantity", "Quantity", symbols) + _choice("slice", "Latency and loss", slices)
+    return _choice("quantity", "Quantity", labels) + _choice("slice", "Latency and loss", slices)
 
 
 def slice_name(where: Slice) -> str:

@@ -12,7 +12,15 @@ import numpy as np
 from hil.judge.consistency import nees_finding
 from hil.reports.cell_looks import legend_html
 from hil.reports.cell_table import cell_table, tightest
-from hil.reports.heat_maps import MERITS, SWITCH, choices_html, heat_maps, slice_name, slice_of
+from hil.reports.heat_maps import (
+    SWITCH,
+    choices_html,
+    heat_maps,
+    merits_of,
+    quantity_labels,
+    slice_name,
+    slice_of,
+)
 from hil.reports.page import Section, page, table_html
 from hil.reports.scroll_frame import FRAME_STYLE, framed
 from hil.reports.sweep_cells import Cell, estimators_of, is_known, is_sound, point_of
@@ -35,10 +43,10 @@ def sweep_report(results: Mapping[str, Any]) -> str:
     if cells:
         names = [_name(cell) for cell in cells]
         sections += [
-            Section("Over noise", f"<p>{choices_html(cells)}</p>\n{legend_html()}"),
+            Section("Over noise", f"<p>{choices_html(cells, quantity_labels(cells))}</p>\n{legend_html()}"),
             *(
                 Section(merit.title, f"<p>{escape(merit.says)}</p>", heat_maps(cells, merit), narrow=True)
-                for merit in MERITS
+                for merit in merits_of(cells)
             ),
             Section("Where it is hardest", _worst(cells, names)),
             Section("All cells", _all_cells(cells, names)),

@@ -14,7 +14,7 @@ from selenium.webdriver.support.ui import Select
 from hil.compare.compare_page import compare_page
 from hil.compare.comparison import compared
 from hil.compare.gathering import groups_of
-from hil.compare.ratio_maps import ratio_maps
+from hil.compare.ratio_maps import map_labels, ratio_maps
 from hil.reports.logs_report import logs_report
 from tests.hil.reports.conftest import browser as browser
 from tests.hil.reports.open_page import open_page
@@ -67,12 +67,29 @@ def sweeps(tmp_path: Path) -> list[Path]:
 
 
 def test_maps_tell_ratios_and_give_no_colour_to_what_diverged(sweeps: list[Path]) -> None:
-    (panel,) = ratio_maps(*groups_of(sweeps))
+    (panel,) = ratio_maps(*groups_of(sweeps), ["v1"])
     data = panel.plot.attributes["renderers"][0].attributes["data_source"].attributes["data"]
     assert (data["text|v1|0"], data["text|v1|1"]) == (["0.50", "1.00"], ["0.50", "0 → 3 ✕"])
     assert data["fill|v1|0"][0] == "#0072b2", "half is better by all that the scale has"
     red, green, blue = (data["fill|v1|1"][1][n : n + 2] for n in (1, 3, 5))
     assert red == green == blue
+
+
+def test_laws_are_shown_by_the_station_first(sweeps: list[Path]) -> None:
+    cell = {
+        "formation": {"deviation": {"rho": 0.001}, "equilibrium_deviation": {"rho": 0.01}},
+        "rmse": {"v1": 1.0},
+    }
+    assert list(map_labels([cell], laws_differ=True)) == ["station", "v1"]
+    assert list(map_labels([cell], laws_differ=False)) == ["v1", "own_run", "station"]
+    tree = json.loads((sweeps[1] / "results.json").read_text())
+    for off, path in ((0.02, sweeps[0]), (0.01, sweeps[1])):
+        for each in tree["cells"]:
+            each["formation"] = {"equilibrium_deviation": {"rho": off}}
+        (path / "results.json").write_text(json.dumps(tree))
+    (panel,) = ratio_maps(*groups_of(sweeps), ["station", "v1"])
+    data = panel.plot.attributes["renderers"][0].attributes["data_source"].attributes["data"]
+    assert data["text"] == data["text|station|0"] == ["0.50", "0.50"]
 
 
 @pytest.mark.slow

@@ -82,7 +82,7 @@ def test_a_sweep_opens_without_a_network_and_shows_what_is_chosen(
     path.write_text(sweep_report(results), encoding="utf-8")
     seen = open_page(browser, path, width)
     assert (seen.errors, seen.fetched, seen.width) == ([], [], width)
-    assert len(seen.inks) == 3 * len(ESTIMATORS)
+    assert len(seen.inks) == 4 * len(ESTIMATORS)
     assert min(seen.inks) > 0  # frames and letters are grey
     at = (f"{1e3 * POSITIONS[1]:g}", f"{math.degrees(HEADINGS[1]):.3g}")
     first = cell("ukf", POSITIONS[1], HEADINGS[1], LATENCIES[0], LOSSES[0])
@@ -93,6 +93,7 @@ def test_a_sweep_opens_without_a_network_and_shows_what_is_chosen(
     assert letters(browser, 1)[at] == f"{math.degrees(other['rmse']['alpha1']):.3g}"
     assert letters(browser, 3)[at] == "1.00"
     assert letters(browser, 8)[at] == "1 ✕", "a run of it diverged"
+    assert letters(browser, 10)[at] == "2", "off the noise-free run [mm], whatever the quantity"
     assert letters(browser, 7)[at] == "34%"
 
 
