@@ -67,7 +67,8 @@ def sweeps(tmp_path: Path) -> list[Path]:
 
 
 def test_maps_tell_ratios_and_give_no_colour_to_what_diverged(sweeps: list[Path]) -> None:
-    (panel,) = ratio_maps(*groups_of(sweeps), ["v1"])
+    first, other = groups_of(sweeps)
+    (panel,) = ratio_maps(first, other, ["v1"])
     data = panel.plot.attributes["renderers"][0].attributes["data_source"].attributes["data"]
     assert (data["text|v1|0"], data["text|v1|1"]) == (["0.50", "1.00"], ["0.50", "0 → 3 ✕"])
     assert data["fill|v1|0"][0] == "#0072b2", "half is better by all that the scale has"
@@ -87,7 +88,8 @@ def test_laws_are_shown_by_the_station_first(sweeps: list[Path]) -> None:
         for each in tree["cells"]:
             each["formation"] = {"equilibrium_deviation": {"rho": off}}
         (path / "results.json").write_text(json.dumps(tree))
-    (panel,) = ratio_maps(*groups_of(sweeps), ["station", "v1"])
+    first, other = groups_of(sweeps)
+    (panel,) = ratio_maps(first, other, ["station", "v1"])
     data = panel.plot.attributes["renderers"][0].attributes["data_source"].attributes["data"]
     assert data["text"] == data["text|station|0"] == ["0.50", "0.50"]
 
