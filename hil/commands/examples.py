@@ -34,8 +34,8 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "bounds": ("abreast bounds", "abreast bounds my_lab.toml --set leader.k_u=0.5 --json"),
     "sweep": (
         "abreast sweep --runs 20 --estimators ekf,ukf",
+        "abreast sweep noise --grid sigma_position=0.001,0.003 --law faded --out faded",
         "abreast sweep my_sweep.toml --keep worst --out sweep",
-        "abreast sweep --scheduler tcp://host:8786",
     ),
     "gains": ("abreast gains my_lab.toml", "abreast gains turtlebot3 --set mocap.latency_s=0.1 --json"),
     "scenario list": ("abreast scenario list", "abreast scenario list --json"),
