@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from formation.angles import FloatArray
 from hil.extensions.reference import short
 from hil.judge.assumptions import judge_assumptions
+from hil.judge.bad_spells import bad_spells
 from hil.judge.bounds import judge_bounds
 from hil.judge.certified import judge_certified
 from hil.judge.clock import arrival_rows, judge_clock
@@ -47,6 +48,7 @@ def summarise(run_data: RunData) -> dict[str, Any]:
     estimates are certified.
     ``law``: a name, of one's own more (:func:`hil.judge.made_by.law_json`).
     ``stopped_by``: who stopped the run before its time, and why; absent where nobody did.
+    ``spells``: when something was bad, and why (:mod:`hil.judge.bad_spells`).
     ``findings``: what nodes found to be wrong, and the judge (:mod:`hil.judge.findings`); absent where nobody
     could have told. ``orders_refused``: why the scenario's own orders to change sides were, if they were.
     ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it, and ``certified`` hold
@@ -82,6 +84,7 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "commands": _commands(columns),
         "orders_refused": refusal(given) if driven else None,
         "stopped_by": stopped_by(run_data.found or {}),
+        "spells": bad_spells(run_data, columns),
         "findings": findings_list(run_data.found, judged_findings(estimation)),
         "rejected": dict(run_data.refused),
         "log": None if run_data.log is None else asdict(run_data.log),

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from hil.judge.made_by import law_failure, made_by
 from hil.judge.noise import noise_warnings
+from hil.judge.spell_words import said_by_spells, spell_lines
 from hil.log.report_json import result_console
 from hil.nodes.findings import finding_line
 
@@ -51,6 +52,7 @@ def warnings_by_part(summary: Mapping[str, Any]) -> dict[str, list[str]]:
     """What deserves a second look, by the part of a run that it is about."""
     law = filter(None, [law_failure(summary)])
     return {
+        "spells": [*spell_lines(summary)],
         "tracking": [*_estimation_warnings(summary)],
         "bounds": [
             *_bound_warnings(summary),
@@ -110,14 +112,22 @@ def _estimate_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]
     rmse = estimation.get("rmse", {})
     parts = []
     if "v1" in rmse:
-        parts.append(f"v1 {1e3 * rmse['v1']:.1f} mm/s")
+        parts.append(f"v1 {1e3 * rmse['v1']:.1f} mm/s{_largest(estimation, 'v1', 1e3)}")
     if "alpha1" in rmse:
-        parts.append(f"alpha1 {math.degrees(rmse['alpha1']):.2f} deg")
+        degrees = math.degrees(1.0)
+        parts.append(f"alpha1 {degrees * rmse['alpha1']:.2f} deg{_largest(estimation, 'alpha1', degrees)}")
     if parts:
         judged = f"({estimation['samples']} samples from {estimation['evaluated_from_s']:.3g} s on)"
         yield "estimate", f"RMSE {', '.join(parts)} {judged}", PLAIN
     yield from _nees_line(estimation)
     yield from _bound_lines(summary)
+
+
+def _largest(estimation: Mapping[str, Any], name: str, scale: float) -> str:
+    """The largest error of a quantity in its unit, and when it was, where that is known."""
+    if name not in estimation.get("max_at_s", {}):
+        return ""
+    return f" (largest {scale * estimation['max'][name]:.3g} at {estimation['max_at_s'][name]:.2f} s)"
 
 
 def _bound_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
@@ -228,8 +238,9 @@ def _estimation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     if not samples:
         yield "nothing to judge: no estimate was marked as tracking in the time that is judged"
         return
-    if untracked:
-        yield f"{untracked} of {samples + untracked} estimates did not say tracking; they are not judged"
+    if (elsewhere := untracked - said_by_spells(summary, "untracked")) > 0:
+        also = " besides" if elsewhere < untracked else ""
+        yield f"{elsewhere} of {samples + untracked} estimates did not say tracking{also}; none is judged"
     low = {
         name: share
         for name, share in estimation.get("coverage_3sigma", {}).items()
@@ -277,8 +288,9 @@ def _formation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
 def _command_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     commands = summary.get("commands", {})
     sent = commands.get("sent", 0)
-    if commands.get("stopped", 0) > STOPPED_SHARE * sent:
-        share = f"{commands['stopped'] / sent:.0%}"
+    stopped = commands.get("stopped", 0) - said_by_spells(summary, "stopped")
+    if stopped > STOPPED_SHARE * sent:
+        share = f"{stopped / sent:.0%}"
         yield f"in {share} of the commands the robot was told to stand still after its first drive"
     if commands.get("saturated", 0) > SATURATED_SHARE * sent:
         yield f"{commands['saturated'] / sent:.0%} of the commands were at a limit of the robot"
@@ -287,6 +299,7 @@ def _command_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
 def _wire_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     frames = summary.get("frames", {})
     lost, published = frames.get("lost", 0), frames.get("published", 0)
+    lost -= said_by_spells(summary, "frames_lost")
     if lost > LOST_SHARE * published:
         yield f"{lost / published:.1%} of the frames never reached the estimator"
     clock = summary.get("clock", {})

@@ -10,10 +10,10 @@ from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
 from hil.figures.plot_data import LONGEST_LINE, PlotData
 from hil.judge.columns import inside
+from hil.judge.intervals import intervals_of
 from hil.judge.summary import percentile
 from hil.reports.colours import BELIEVED, BLACK, BOUND, FOLLOWER, GREY, PURPLE
 from hil.reports.decimation import decimated_rows
-from hil.reports.intervals import intervals_of
 from hil.reports.plot_models import Field, Model, Value, source_of
 from hil.reports.plots import Key, Panel, TimeAxis, draw_level, draw_line, draw_marks, hover, marks, table
 

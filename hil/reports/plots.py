@@ -11,12 +11,13 @@ import numpy as np
 
 from formation.angles import FloatArray
 from hil.figures.plot_data import LONGEST_LINE
-from hil.reports.colours import AXIS, DARK, GREY, GRID, SHADE
+from hil.reports.colours import AXIS, BOUND, DARK, GREY, GRID, SHADE
 from hil.reports.decimation import decimated_rows
 from hil.reports.page_script import NOW
 from hil.reports.plot_models import DASHES, Field, Figure, Model, Value, source_of
 
 HEIGHT = 210
+_MOST_SHADED = 20
 _FONT = "system-ui, sans-serif"
 
 
@@ -47,11 +48,15 @@ class Panel:
 class TimeAxis:
     """The time that all panels of a page share: they zoom together, and one cursor runs through all.
 
-    ``first``, ``last``: what is shown to begin with [s]. Before ``judged_from`` it is shaded.
+    ``first``, ``last``: what is shown to begin with [s]. Before ``judged_from`` it is shaded, and so are
+    ``spells``, from when to when [s], the longest if there are many.
     """
 
-    def __init__(self, first: float, last: float, judged_from: float) -> None:
+    def __init__(
+        self, first: float, last: float, judged_from: float, spells: Sequence[tuple[float, float]] = ()
+    ) -> None:
         self.first, self.last, self.judged_from = first, last, judged_from
+        self.spells = sorted(spells, key=lambda spell: spell[0] - spell[1])[:_MOST_SHADED]
         self._range = Model("Range1d", start=first, end=last if last > first else first + 1.0)
         self._cursor = Model("Span", dimension="height", line_color=GREY, line_dash=DASHES["dotted"])
         self._now = Model(
@@ -78,6 +83,9 @@ class TimeAxis:
             up = [y[0], y[0], y[1], y[1]]
             looks = {"fill_color": SHADE, "fill_alpha": 0.05, "line_alpha": 0.0, "level": "image"}
             plot.add_layout(Model("PolyAnnotation", xs=across, ys=up, **looks))
+        for left, right in self.spells:
+            looks = {"fill_color": BOUND, "fill_alpha": 0.1, "line_alpha": 0.0, "level": "image"}
+            plot.add_layout(Model("BoxAnnotation", left=left, right=right, **looks))
         return plot
 
 

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import degrees
 from typing import Any
 
+from hil.judge.intervals import TimeInterval
 from hil.reports.certificate_table import certificate_html
 from hil.reports.figure_labels import BOUNDED, LABELS
-from hil.reports.intervals import TimeInterval
 from hil.reports.notation import written
 from hil.reports.page import table_html
 
@@ -37,7 +37,7 @@ _COUNTS = {
 }
 _ELSEWHERE = (
     *("scenario", "seed", "mode", "estimator", "law", "duration_s", "truth", "findings", "orders_refused"),
-    *("log.", "law.", "parity.", "stopped_by."),
+    *("spells", "log.", "law.", "parity.", "stopped_by."),
 )
 """What other parts of the page say."""
 
@@ -102,6 +102,7 @@ def _estimates(left: dict[str, Any]) -> list[str]:
     errors = {
         "rmse": ("RMSE", _number),
         "max": ("largest", _number),
+        "max_at_s": ("at [s]", lambda at_s: f"{at_s:.2f}"),
         "efficiency": ("× bound for random leaders", _number),
     }
     deviations = {
