@@ -154,9 +154,32 @@ def draw_line(
 
 
 def draw_band(plot: Figure, source: Model, low: str, high: str, colour: str) -> None:
-    """What lies between two columns, filled."""
-    area = Model("VArea", x=Field("t"), y1=Field(low), y2=Field(high), fill_color=colour, fill_alpha=0.18)
-    plot.add_glyph(source, area)
+    """What lies between two columns, filled, and broken where these are."""
+    looks = {"fill_color": colour, "fill_alpha": 0.18}
+    held = source.attributes["data"]
+    t, lower, upper = (np.asarray(held[name]) for name in ("t", low, high))
+    if np.all(np.isfinite(lower) & np.isfinite(upper)):
+        plot.add_glyph(source, Model("VArea", x=Field("t"), y1=Field(low), y2=Field(high), **looks))
+        return
+    # An area of Bokeh's goes straight through what is not known; the outline of several parts does not.
+    x, y = _outlines(t, lower, upper)
+    plot.add_glyph(
+        source_of({"x": x, "y": _short(y)}),
+        Model("Patch", x=Field("x"), y=Field("y"), **looks, line_alpha=0.0),
+    )
+
+
+def _outlines(t: FloatArray, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Outlines of a band with NaN between its parts: there along the lower side, back along the upper one."""
+    known = np.isfinite(lower) & np.isfinite(upper)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(np.int8)))
+    gap = np.array([math.nan])
+    x: list[FloatArray] = []
+    y: list[FloatArray] = []
+    for first, end in edges.reshape(-1, 2).tolist():
+        x += [t[first:end], t[first:end][::-1], gap]
+        y += [lower[first:end], upper[first:end][::-1], gap]
+    return np.concatenate([gap, *x]), np.concatenate([gap, *y])
 
 
 def draw_level(plot: Figure, value: float, colour: str, dash: str) -> None:
