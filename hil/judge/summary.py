@@ -51,6 +51,7 @@ def summarise(run_data: RunData) -> dict[str, Any]:
     ``spells``: when something was bad, and why (:mod:`hil.judge.bad_spells`).
     ``findings``: what nodes found to be wrong, and the judge (:mod:`hil.judge.findings`); absent where nobody
     could have told. ``orders_refused``: why the scenario's own orders to change sides were, if they were.
+    ``window``: when alone estimates, bounds, formation and spells are judged, where that was asked for.
     ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it, and ``certified`` hold
     no figures where ``noise`` says that the noise exceeds what they rest on.
     """
@@ -67,6 +68,7 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "estimator": short(given.estimator.kind),
         "law": law_json(given, run_data.law) if driven or len(columns.commands.issued_ns) else None,
         "duration_s": columns.run.seconds,
+        "window": _window(run_data, columns),
         "frames": _frames(run_data),
         "estimation": estimation,
         "bounds": judge_bounds(given, columns)
@@ -91,6 +93,14 @@ def summarise(run_data: RunData) -> dict[str, Any]:
     }
     result: dict[str, Any] = known(summary)
     return result
+
+
+def _window(run_data: RunData, columns: Columns) -> dict[str, float] | None:
+    """What is judged in seconds of the run, where that was asked for."""
+    if run_data.evaluate_from_ns is None and run_data.evaluate_to_ns is None:
+        return None
+    span, zero_ns = columns.span, run_data.zero_ns
+    return {"from_s": (span.from_ns - zero_ns) / 1e9, "to_s": (span.to_ns - zero_ns) / 1e9}
 
 
 def _frames(run_data: RunData) -> dict[str, int | None]:

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from hil.judge.consistency import are_telling
 from hil.judge.made_by import law_failure, made_by
 from hil.judge.noise import noise_warnings
 from hil.judge.spell_words import said_by_spells, spell_lines
@@ -91,10 +92,16 @@ def verdict_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
 
 
 def judged_by(summary: Mapping[str, Any]) -> str:
-    """What a run was judged by in place of the truth; empty where that is known."""
-    if summary.get("truth") != "mocap":
-        return ""
-    return "by the smoothed mocap tracks, whose own errors are in what follows"
+    """What stood for the truth, and which part of a run was judged; empty for all of it by the truth."""
+    told = []
+    if summary.get("truth") == "mocap":
+        told.append("by the smoothed mocap tracks, whose own errors are in what follows")
+    if window := summary.get("window"):
+        told.append(
+            f"from {window['from_s']:.4g} to {window['to_s']:.4g} s only: estimates, bounds, formation, bad "
+            "spells; frames, latency, commands, inputs refused and findings are of the whole run"
+        )
+    return "; ".join(told)
 
 
 def parity_line(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
@@ -159,7 +166,8 @@ def _nees_line(estimation: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     for name in ("v1", "alpha1", "u1"):
         if name in limits:
             low, high = limits[name]
-            parts.append(f"{name} {estimation['nees'][name]:.2f} ({low:.2f} to {high:.2f})")
+            expected = f"{low:.2f} to {high:.2f}" if are_telling(limits[name]) else "too short to tell"
+            parts.append(f"{name} {estimation['nees'][name]:.2f} ({expected})")
     if parts:
         yield "nees", f"squared errors over their variances: {', '.join(parts)}", PLAIN
 
@@ -291,9 +299,16 @@ def _command_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     stopped = commands.get("stopped", 0) - said_by_spells(summary, "stopped")
     if stopped > STOPPED_SHARE * sent:
         share = f"{stopped / sent:.0%}"
-        yield f"in {share} of the commands the robot was told to stand still after its first drive"
+        where = _where(summary)
+        yield f"in {share} of the commands{where} the robot was told to stand still after its first drive"
     if commands.get("saturated", 0) > SATURATED_SHARE * sent:
-        yield f"{commands['saturated'] / sent:.0%} of the commands were at a limit of the robot"
+        share = f"{commands['saturated'] / sent:.0%}"
+        yield f"{share} of the commands{_where(summary)} were at a limit of the robot"
+
+
+def _where(summary: Mapping[str, Any]) -> str:
+    """What counts of the whole run are of, where less of it is judged."""
+    return " of the whole run" if summary.get("window") else ""
 
 
 def _wire_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
@@ -301,7 +316,7 @@ def _wire_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     lost, published = frames.get("lost", 0), frames.get("published", 0)
     lost -= said_by_spells(summary, "frames_lost")
     if lost > LOST_SHARE * published:
-        yield f"{lost / published:.1%} of the frames never reached the estimator"
+        yield f"{lost / published:.1%} of the frames{_where(summary)} never reached the estimator"
     clock = summary.get("clock", {})
     if clock.get("jumps"):
         times = "once" if clock["jumps"] == 1 else f"{clock['jumps']} times"

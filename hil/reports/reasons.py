@@ -201,8 +201,9 @@ def _latency(summary: Mapping[str, Any]) -> Reason | None:
     frames = summary.get("frames", {})
     parts = []
     if waits:
+        largest = "largest of those that came" if frames.get("lost") else "largest"
         parts.append(
-            f"{waits['p50']:.1f} ms (median), {waits['p99']:.1f} (99 %), {waits['max']:.1f} (largest)"
+            f"{waits['p50']:.1f} ms (median), {waits['p99']:.1f} (99 %), {waits['max']:.1f} ({largest})"
         )
     if frames.get("lost"):
         parts.append(f"{frames['lost']} of {frames['published']} frames lost")

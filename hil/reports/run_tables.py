@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import degrees
 from typing import Any
 
+from hil.judge.consistency import are_telling
 from hil.judge.intervals import TimeInterval
 from hil.reports.certificate_table import certificate_html
 from hil.reports.figure_labels import BOUNDED, LABELS
@@ -37,7 +38,7 @@ _COUNTS = {
 }
 _ELSEWHERE = (
     *("scenario", "seed", "mode", "estimator", "law", "duration_s", "truth", "findings", "orders_refused"),
-    *("spells", "log.", "law.", "parity.", "stopped_by."),
+    *("spells", "window.", "log.", "law.", "parity.", "stopped_by."),
 )
 """What other parts of the page say."""
 
@@ -108,12 +109,17 @@ def _estimates(left: dict[str, Any]) -> list[str]:
     deviations = {
         "coverage_3sigma": ("within 3 σ", lambda share: f"{share:.2%}"),
         "nees": ("NEES", _number),
-        "nees_limits": ("expected", lambda limits: " to ".join(map(_number, limits))),
+        "nees_limits": ("expected", _expected),
     }
     return [
         _by_quantity(left, f"Errors of the estimates {over}", errors),
         _by_quantity(left, f"Errors against their deviations {over}", deviations),
     ]
+
+
+def _expected(limits: Sequence[float]) -> str:
+    """Where a NEES is expected, if that says anything."""
+    return " to ".join(map(_number, limits)) if are_telling(limits) else "too short to tell"
 
 
 def _by_quantity(left: dict[str, Any], caption: str, columns: _Columns) -> str:

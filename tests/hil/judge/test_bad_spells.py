@@ -15,7 +15,7 @@ from hil.judge.bad_spells import bad_spells
 from hil.judge.columns import columns_of
 from hil.judge.run_data import RunData, run_data_of_log
 from hil.judge.summary import summarise
-from hil.judge.summary_text import warnings_of
+from hil.judge.summary_text import verdict_lines, warnings_of
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import Log, read_log
 from hil.scenario.files import load_scenario
@@ -151,6 +151,21 @@ def test_only_what_is_to_be_judged_is_looked_at(exact_run_data: RunData) -> None
     assert spell["from_s"] == pytest.approx(180 * FRAME_S)
     (spell,) = spells_of(replace(lost, evaluate_to_ns=zero_ns + 2_500_000_000))
     assert spell["to_s"] == pytest.approx(100 * FRAME_S)
+
+
+def test_a_window_is_told_and_what_is_not_of_it(dropout: Log) -> None:
+    run_data = run_data_of_log(dropout)
+    zero_ns = run_data.zero_ns
+    summary = summarise(
+        replace(run_data, evaluate_from_ns=zero_ns + 7 * 10**9, evaluate_to_ns=zero_ns + 8 * 10**9)
+    )
+    assert summary["window"] == {"from_s": 7.0, "to_s": 8.0}
+    assert summary["spells"] == []
+    assert "window" not in summarise(run_data)
+    judged = [text for name, text, _ in verdict_lines(summary) if name == "judged"]
+    assert judged[0].startswith("from 7 to 8 s only: estimates")
+    assert any("of the frames of the whole run never reached" in each for each in warnings_of(summary))
+    assert any("of the commands of the whole run the robot was told" in each for each in warnings_of(summary))
 
 
 def test_when_the_largest_error_was_is_told(exact_run_data: RunData) -> None:
