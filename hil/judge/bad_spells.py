@@ -17,8 +17,10 @@ from hil.judge.columns import Columns, inside
 from hil.judge.estimation import errors_at
 from hil.judge.intervals import TimeInterval, intervals_of
 from hil.judge.run_data import RunData, Span
-from hil.judge.spell_words import FRAMES, OUTSIDE, STATUS, STOOD, Bad, causes_of
+from hil.judge.spell_troubles import odometry_stretches, refused_in
+from hil.judge.spell_words import FRAMES, ODOMETRY, OUTSIDE, STATUS, STOOD, Bad, causes_of
 from hil.judge.true_states import Stamps
+from hil.nodes.troubles import Trouble
 
 LONGEST_SILENCE_S, SILENT_PERIODS = 0.25, 5
 """Without a frame for longer than both, the second in periods of the frames, the estimate is a guess."""
@@ -28,6 +30,8 @@ SIGMAS = 5.0
 """Of Gaussian errors one in two million lies so many deviations out."""
 NEAR_S = 0.5
 """What is no further apart is one spell; errors of the estimates right after it are its doing."""
+LASTING = 0.5
+"""Odometry that is wrong for this share of the time is how the run was, which its finding says."""
 WORST = ("v1", "alpha1")
 
 
@@ -49,8 +53,9 @@ def bad_spells(run_data: RunData, columns: Columns) -> list[dict[str, Any]]:
 
     Looked for from when the leader had set off and the first estimate said TRACKING, or in what is to be
     judged where that was asked for. A spell begins with frames that stay away, estimates that do not say
-    TRACKING, a follower that is told to stand after its first drive, or judged errors of v1 and alpha1
-    outside five deviations or their published bound; what is no further apart than :data:`NEAR_S` is one.
+    TRACKING, a follower that is told to stand after its first drive, judged errors of v1 and alpha1 outside
+    five deviations or their published bound, or odometry that was found to be wrong for a while; what is no
+    further apart than :data:`NEAR_S` is one.
     ``from_s``, ``to_s``: seconds of the run. ``causes``: in words. ``frames_lost``, ``untracked``,
     ``stopped``: frames, judged estimates and commands of the spell that count as such elsewhere in the
     summary. ``worst``: ``error`` (absolute) and capture time ``at_s`` by quantity, of the estimates that
@@ -58,13 +63,16 @@ def bad_spells(run_data: RunData, columns: Columns) -> list[dict[str, Any]]:
     """
     watched = _watched(run_data, columns)
     lapses = list(_lapses(watched))
+    odometry = list(_odometry(run_data.troubles, watched))
     found = [
+        *(each for each in odometry if each.to_s - each.from_s < LASTING * watched.span.seconds),
         *_silences(run_data, watched),
-        *(each for each in lapses if each.to_s - each.from_s >= SHORTEST_LAPSE_S),
+        *_long(lapses),
         *_stood(watched),
         *(() if run_data.tracks is not None else _outside(watched)),
     ]
-    return [_spell(watched, each, lapses) for each in _merged(found)]
+    joining = [*lapses, *odometry]
+    return [_spell(watched, each, joining, run_data.troubles) for each in _merged(found)]
 
 
 def _watched(run_data: RunData, columns: Columns) -> Watched:
@@ -111,6 +119,19 @@ def _lapses(watched: Watched) -> Iterator[Bad]:
     yield from _bad(STATUS, told, Status.TRACKING.name)
 
 
+def _long(lapses: Sequence[Bad]) -> Iterator[Bad]:
+    """Lapses that are long enough together with those that they go over into."""
+    groups: list[list[Bad]] = []
+    for each in lapses:
+        if groups and each.from_s <= groups[-1][-1].to_s:
+            groups[-1].append(each)
+        else:
+            groups.append([each])
+    for group in groups:
+        if group[-1].to_s - group[0].from_s >= SHORTEST_LAPSE_S:
+            yield from group
+
+
 def _stood(watched: Watched) -> Iterator[Bad]:
     """When the follower was told to stand after its first drive, by reason."""
     commands = watched.columns.commands
@@ -141,6 +162,15 @@ def _outside(watched: Watched) -> Iterator[Bad]:
             if np.any(beyond[during]):
                 words = [f"{name} outside {what}" if each else "" for each in beyond[during].tolist()]
                 yield from _bad(OUTSIDE, intervals_of(at_s, words, NEAR_S), "")
+
+
+def _odometry(troubles: Sequence[Trouble], watched: Watched) -> Iterator[Bad]:
+    """When odometry was found to be wrong."""
+    for name, span in odometry_stretches(troubles):
+        begin, end = max(span.from_ns, watched.span.from_ns), min(span.to_ns, watched.span.to_ns)
+        if begin < end:
+            from_s, to_s = watched.seconds(np.array([begin, end])).tolist()
+            yield Bad(ODOMETRY, name, from_s, to_s, 0)
 
 
 def _bad(kind: str, intervals: Sequence[TimeInterval], good: str) -> Iterator[Bad]:
@@ -175,13 +205,16 @@ def _merged(found: Sequence[Bad]) -> list[list[Bad]]:
     return groups
 
 
-def _spell(watched: Watched, bad: Sequence[Bad], lapses: Sequence[Bad]) -> dict[str, Any]:
+def _spell(
+    watched: Watched, bad: Sequence[Bad], joining: Sequence[Bad], troubles: Sequence[Trouble]
+) -> dict[str, Any]:
     from_s, to_s = min(each.from_s for each in bad), max(each.to_s for each in bad)
-    short = [each for each in lapses if each not in bad and from_s <= each.to_s and each.from_s <= to_s]
+    others = [each for each in joining if each not in bad and from_s <= each.to_s and each.from_s <= to_s]
+    span = Span(*(watched.zero_ns + round(at_s * 1e9) for at_s in (from_s, to_s)))
     return {
         "from_s": from_s,
         "to_s": to_s,
-        "causes": causes_of([*bad, *short]),
+        "causes": [*causes_of([*bad, *others]), *refused_in(troubles, span)],
         "frames_lost": sum(each.count for each in bad if each.kind == FRAMES),
         **_counts(watched, from_s, to_s),
         "worst": _worst(watched, from_s, to_s + NEAR_S),

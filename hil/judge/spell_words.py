@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-FRAMES, STATUS, STOOD, OUTSIDE = "frames", "status", "stood", "outside"
-_KINDS = (FRAMES, STATUS, STOOD, OUTSIDE)
+FRAMES, STATUS, STOOD, OUTSIDE, ODOMETRY = "frames", "status", "stood", "outside", "odometry"
+_KINDS = (FRAMES, STATUS, STOOD, OUTSIDE, ODOMETRY)
 _STATUSES = {"INITIALISING": "re-acquiring", "REJECTING": "refusing frames"}
 MOST_LINES = 3
 """Of spells in a terminal; more are in the report."""
@@ -37,7 +37,7 @@ def causes_of(bad: Sequence[Bad]) -> list[str]:
 
 def spell_line(spell: Mapping[str, Any]) -> str:
     """A spell of a summary in one line."""
-    worst = [_off(name, each) for name, each in sorted(spell["worst"].items())]
+    worst = [_off(name, each) for name, each in sorted(spell.get("worst", {}).items())]
     off = [f"off by up to {', '.join(worst)}"] if worst else []
     return f"{times_of(spell)}: {'; '.join([*spell['causes'], *off])}"
 
@@ -71,7 +71,8 @@ def _silences(bad: Sequence[Bad]) -> Iterator[str]:
     whole = sum(each.to_s - each.from_s for each in bad)
     again = f" {len(bad)} times," if len(bad) > 1 else ""
     in_all = " in all" if len(bad) > 1 else ""
-    yield f"no frame{again} for {_length(whole)}{in_all}{told}"
+    used = "" if lost else " used"
+    yield f"no frame{used}{again} for {_length(whole)}{in_all}{told}"
 
 
 def _statuses(bad: Sequence[Bad]) -> Iterator[str]:
@@ -93,7 +94,13 @@ def _errors(bad: Sequence[Bad]) -> Iterator[str]:
         yield f"{what} in {count} {'estimate' if count == 1 else 'estimates'}"
 
 
-_WORDS = {FRAMES: _silences, STATUS: _statuses, STOOD: _stops, OUTSIDE: _errors}
+def _findings(bad: Sequence[Bad]) -> Iterator[str]:
+    for name in dict.fromkeys(each.what for each in bad):
+        during = _during([each for each in bad if each.what == name])
+        yield f"{name.replace('_', ' ')} {during}"
+
+
+_WORDS = {FRAMES: _silences, STATUS: _statuses, STOOD: _stops, OUTSIDE: _errors, ODOMETRY: _findings}
 
 
 def _joined(bad: Sequence[Bad]) -> list[Bad]:

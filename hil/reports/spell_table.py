@@ -32,5 +32,5 @@ def spell_table(summary: Mapping[str, Any]) -> str:
 
 
 def _worst(spell: Mapping[str, Any], name: str, scale: float, unit: str) -> str:
-    worst = spell["worst"].get(name)
+    worst = spell.get("worst", {}).get(name)
     return "–" if worst is None else f"{scale * worst['error']:.3g} {unit} at {worst['at_s']:.2f} s"

@@ -13,11 +13,15 @@ import pytest
 from estimation.tracking.tracker import Status
 from hil.judge.bad_spells import bad_spells
 from hil.judge.columns import columns_of
+from hil.judge.replayed import ReplayChoice, replayed
 from hil.judge.run_data import RunData, run_data_of_log
+from hil.judge.spell_words import spell_lines
 from hil.judge.summary import summarise
 from hil.judge.summary_text import verdict_lines, warnings_of
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import Log, read_log
+from hil.nodes.troubles import Trouble
+from hil.reports.spell_table import spell_table
 from hil.scenario.files import load_scenario
 from hil.wire.messages import to_ns, to_time
 from tests.hil.conftest import FRAME_NS
@@ -166,6 +170,61 @@ def test_a_window_is_told_and_what_is_not_of_it(dropout: Log) -> None:
     assert judged[0].startswith("from 7 to 8 s only: estimates")
     assert any("of the frames of the whole run never reached" in each for each in warnings_of(summary))
     assert any("of the commands of the whole run the robot was told" in each for each in warnings_of(summary))
+
+
+def test_frames_that_are_refused_are_told_by_their_cause(tmp_path: Path) -> None:
+    fault = 'mocap.faults=[{kind="freeze", at_s=3, duration_s=1}]'
+    path = tmp_path / "run.mcap"
+    run_lockstep(load_scenario("turtlebot3", ["run.duration_s=6", "run.evaluate_from_s=2", fault]), path)
+    (spell,) = summarise(run_data_of_log(read_log(path)))["spells"]
+    assert spell["causes"][0].startswith("refusing frames 3.03 to 4.00 s, lost 4.00 to 4.03 s")
+    assert any(cause.startswith("inputs refused: frozen 12") for cause in spell["causes"])
+    choice = ReplayChoice(verify=True)
+    assert replayed(read_log(path), choice).summary["spells"] == [spell]
+    other = replayed(read_log(path), ReplayChoice(estimator="ukf")).summary["spells"]
+    assert not any("inputs refused" in cause for each in other for cause in each["causes"])
+
+
+def troubled(run_data: RunData, reports: Sequence[tuple[float, dict[str, int], set[str]]]) -> RunData:
+    zero_ns = run_data.zero_ns
+    told = [
+        Trouble(zero_ns + round(at_s * 1e9), refused, frozenset(found)) for at_s, refused, found in reports
+    ]
+    return replace(run_data, troubles=told)
+
+
+def test_odometry_that_is_wrong_for_a_while_is_a_spell_but_not_for_good(exact_run_data: RunData) -> None:
+    wrong = {"odometry_contradicts"}
+    while_s, for_good = (1.5, 2.0), (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
+    (spell,) = spells_of(troubled(exact_run_data, [(at_s, {}, wrong) for at_s in while_s]))
+    assert spell["causes"] == ["odometry contradicts 1.5 to 2.5 s"]
+    lasting = troubled(exact_run_data, [(at_s, {}, wrong) for at_s in for_good])
+    assert spells_of(lasting) == []
+    (joined,) = spells_of(lapsing(lasting, range(120, 130)))
+    assert joined["causes"] == ["lost 2.00 to 2.17 s", "odometry contradicts 0.5 to 4.0 s"]
+
+
+def test_what_was_refused_outside_of_a_spell_is_none_of_its_causes(exact_run_data: RunData) -> None:
+    counts = [(1.0, {"gated": 4}), (1.9, {"gated": 5, "unknown_body": 9}), (2.5, {"gated": 5, "swapped": 7})]
+    reports = [(at_s, refused, set[str]()) for at_s, refused in counts]
+    (spell,) = spells_of(lapsing(troubled(exact_run_data, reports), range(120, 130)))
+    assert spell["causes"] == ["lost 2.00 to 2.17 s", "inputs refused: swapped 7"]
+
+
+def test_a_spell_without_any_estimate_that_could_be_judged_is_told(exact_run_data: RunData) -> None:
+    bare = replace(lapsing(exact_run_data, range(120, 180)), truth=[])
+    summary = summarise(bare)
+    assert "worst" not in summary["spells"][0]
+    assert [each for each in warnings_of(summary) if each.startswith("2.0 to 3.0 s: lost 2.0 to 3.0 s")]
+    assert "2.0 to 3.0 s" in spell_table(summary)
+
+
+def test_the_longest_are_told_and_how_many_more_there_are(exact_run_data: RunData) -> None:
+    lengths = {20: 7, 60: 12, 110: 8, 160: 9, 210: 10}
+    rows = [row for first, count in lengths.items() for row in range(first, first + count)]
+    said = [*spell_lines(summarise(lapsing(exact_run_data, rows)))]
+    assert [line[:4] for line in said] == ["1.00", "3.50", "2.67", "and "]
+    assert said[3] == "and 2 more bad spells, shorter ones, in the report"
 
 
 def test_when_the_largest_error_was_is_told(exact_run_data: RunData) -> None:

@@ -321,7 +321,7 @@ def test_bad_spells_are_told_first_and_shaded_in_all_plots_over_time(exact_run_d
         estimates[row] = replace(estimates[row], header=estimates[119].header, status=int(Status.LOST))
     page = report(replace(exact_run_data, estimates=estimates))
     said = words(page)
-    assert "All bounds held, but there was a bad spell: 2.0 to 3.0 s, no frame for 1.0 s" in said
+    assert "All bounds held, but there was a bad spell: 2.0 to 3.0 s, no frame used for 1.0 s" in said
     assert "look again: bad spells 2.0 to 3.0 s" in said
     assert said.index("When something was bad, and why") < said.index("From above")
     assert "Bad spells are shaded in red." in said
