@@ -25,11 +25,12 @@ from hil.nodes.troubles import Trouble
 LONGEST_SILENCE_S, SILENT_PERIODS = 0.25, 5
 """Without a frame for longer than both, the second in periods of the frames, the estimate is a guess."""
 SHORTEST_LAPSE_S = 0.1
-"""That estimates do not say TRACKING for less, as where one frame is turned away, is no spell by itself."""
+"""Estimates that are not TRACKING for less, as where a frame is turned away, or far off, are no spell."""
 SIGMAS = 5.0
 """Of Gaussian errors one in two million lies so many deviations out."""
 NEAR_S = 0.5
 """What is no further apart is one spell; errors of the estimates right after it are its doing."""
+_BOUND = "its bound"
 LASTING = 0.5
 """Odometry that is wrong for this share of the time is how the run was, which its finding says."""
 WORST = ("v1", "alpha1")
@@ -64,14 +65,16 @@ def bad_spells(run_data: RunData, columns: Columns) -> list[dict[str, Any]]:
     watched = _watched(run_data, columns)
     lapses = list(_lapses(watched))
     odometry = list(_odometry(run_data.troubles, watched))
+    # What stands in for the truth errs as much as good estimates do.
+    outside = [] if run_data.tracks is not None else list(_outside(watched))
     found = [
         *(each for each in odometry if each.to_s - each.from_s < LASTING * watched.span.seconds),
         *_silences(run_data, watched),
         *_long(lapses),
         *_stood(watched),
-        *(() if run_data.tracks is not None else _outside(watched)),
+        *(each for each in outside if _BOUND in each.what or each.to_s - each.from_s >= SHORTEST_LAPSE_S),
     ]
-    joining = [*lapses, *odometry]
+    joining = [*lapses, *odometry, *outside]
     return [_spell(watched, each, joining, run_data.troubles) for each in _merged(found)]
 
 
@@ -156,7 +159,7 @@ def _outside(watched: Watched) -> Iterator[Bad]:
         error = np.abs(errors[name])
         limits = {f"{SIGMAS:.0f} sigma": SIGMAS * samples.sd[:, QUANTITIES.index(name)]}
         if samples.bounds is not None:
-            limits["its bound"] = samples.bounds[:, place]
+            limits[_BOUND] = samples.bounds[:, place]
         for what, limit in limits.items():
             beyond: NDArray[np.bool_] = error > limit + ROUNDING
             if np.any(beyond[during]):

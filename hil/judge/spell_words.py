@@ -28,7 +28,7 @@ class Bad:
 
 def causes_of(bad: Sequence[Bad]) -> list[str]:
     """All that was bad in a spell, each kind once, in words with times of the run."""
-    in_order = sorted(bad, key=lambda each: (_KINDS.index(each.kind), each.from_s))
+    in_order = sorted(bad, key=lambda each: (_KINDS.index(each.kind), each.from_s, each.what))
     causes: list[str] = []
     for kind, group in groupby(in_order, key=lambda each: each.kind):
         causes += _WORDS[kind](list(group))
@@ -37,9 +37,14 @@ def causes_of(bad: Sequence[Bad]) -> list[str]:
 
 def spell_line(spell: Mapping[str, Any]) -> str:
     """A spell of a summary in one line."""
+    return f"{times_of(spell)}: {spell_told(spell)}"
+
+
+def spell_told(spell: Mapping[str, Any]) -> str:
+    """What was bad in a spell, and how far off the estimates were."""
     worst = [_off(name, each) for name, each in sorted(spell.get("worst", {}).items())]
     off = [f"off by up to {', '.join(worst)}"] if worst else []
-    return f"{times_of(spell)}: {'; '.join([*spell['causes'], *off])}"
+    return "; ".join([*spell["causes"], *off])
 
 
 def times_of(spell: Mapping[str, Any]) -> str:

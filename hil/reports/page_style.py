@@ -61,8 +61,7 @@ th, td { text-align: right; padding: .15rem .4rem; border-bottom: 1px solid var(
 tbody tr:last-child > * { border-bottom: 0; }
 .many tbody th { min-width: 8.5rem; }
 .long td, .long th { overflow-wrap: anywhere; }
-.long th:first-child { width: 34%; } #bad-spells th:first-child { width: 7.5rem; }
-#bad-spells { margin-bottom: 1.5rem; } .long td, .long th { text-align: left; }
+.long th:first-child { width: 34%; } .long td, .long th { text-align: left; }
 th:first-child, td:first-child { text-align: left; padding-left: 0; }
 thead th { font-weight: 600; } tbody th { font-weight: 400; }
 .keys { list-style: none; display: flex; flex-wrap: wrap; gap: 0 .9rem; margin: .1rem 0; padding: 0;

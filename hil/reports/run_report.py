@@ -20,7 +20,7 @@ from hil.reports.provenance import provenance_html
 from hil.reports.reasons import finding_name, verdict_html, warnings_html
 from hil.reports.run_tables import stops_table, summary_tables
 from hil.reports.shape_plots import COURSE, shape_panels
-from hil.reports.spell_table import spell_table
+from hil.reports.spell_list import spell_list
 from hil.reports.track_plot import track_panel
 
 _READOUT = (("rho", "ρ", "m", 3), ("alpha1", "α₁", "deg", 1), ("alpha2", "α₂", "deg", 1))
@@ -57,7 +57,7 @@ def _sections(
         return Section(heading, f"{warned}{html}", panels, below=tables.get(place, ""), anchor=place)
 
     return [
-        Section("Bad spells", spell_table(summary)),
+        Section("Bad spells", spell_list(summary)),
         Section("At a glance", panels=glance, below=_shaded(axis) if glance else "", quiet=True),
         part("Formation", "formation", panels=shapes[2:]),
         part(

@@ -21,7 +21,7 @@ from hil.judge.summary_text import verdict_lines, warnings_of
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import Log, read_log
 from hil.nodes.troubles import Trouble
-from hil.reports.spell_table import spell_table
+from hil.reports.spell_list import spell_list
 from hil.scenario.files import load_scenario
 from hil.wire.messages import to_ns, to_time
 from tests.hil.conftest import FRAME_NS
@@ -38,6 +38,14 @@ def lapsing(run_data: RunData, rows: Sequence[int], status: Status = Status.LOST
     estimates = list(run_data.estimates)
     for row in rows:
         estimates[row] = replace(estimates[row], status=int(status))
+    return replace(run_data, estimates=estimates)
+
+
+def off_in(run_data: RunData, rows: Sequence[int], off: float) -> RunData:
+    """Estimates whose v1 is off by so much [m/s] in these rows, where they are sure of 1 mm/s."""
+    estimates, covariance = list(run_data.estimates), 1e-6 * np.eye(5).reshape(25)
+    for row in rows:
+        estimates[row] = replace(estimates[row], v1=estimates[row].v1 + off, covariance=covariance)
     return replace(run_data, estimates=estimates)
 
 
@@ -128,24 +136,25 @@ def test_a_follower_that_waits_for_its_first_drive_is_not_in_a_spell(exact_run_d
     ("off", "causes"),
     [
         (0.004, []),
-        (0.006, ["v1 outside 5 sigma in 1 estimate"]),
-        (0.06, ["v1 outside 5 sigma in 1 estimate", "v1 outside its bound in 1 estimate"]),
+        (0.006, ["v1 outside 5 sigma in 7 estimates"]),
+        (0.06, ["v1 outside 5 sigma in 7 estimates", "v1 outside its bound in 7 estimates"]),
     ],
 )
 def test_errors_far_outside_are_told_with_their_time(
     exact_run_data: RunData, off: float, causes: list[str]
 ) -> None:
-    estimates = list(exact_run_data.estimates)
-    estimates[150] = replace(
-        estimates[150],
-        v1=estimates[150].v1 + off,
-        covariance=1e-6 * np.eye(5).reshape(25),
-    )
-    found = spells_of(replace(exact_run_data, estimates=estimates))
+    found = spells_of(off_in(exact_run_data, range(150, 157), off))
     assert [cause for spell in found for cause in spell["causes"]] == causes
     for spell in found:
+        assert spell["from_s"] == pytest.approx(150 * FRAME_S)
         assert spell["worst"]["v1"]["error"] == pytest.approx(off)
-        assert spell["worst"]["v1"]["at_s"] == pytest.approx(150 * FRAME_S)
+        assert spell["worst"]["v1"]["at_s"] == pytest.approx(153 * FRAME_S, abs=4 * FRAME_S)
+
+
+def test_a_single_error_is_a_spell_only_outside_its_bound(exact_run_data: RunData) -> None:
+    assert spells_of(off_in(exact_run_data, [150], 0.006)) == []
+    (spell,) = spells_of(off_in(exact_run_data, [150], 0.06))
+    assert spell["causes"] == ["v1 outside 5 sigma in 1 estimate", "v1 outside its bound in 1 estimate"]
 
 
 def test_only_what_is_to_be_judged_is_looked_at(exact_run_data: RunData) -> None:
@@ -216,7 +225,7 @@ def test_a_spell_without_any_estimate_that_could_be_judged_is_told(exact_run_dat
     summary = summarise(bare)
     assert "worst" not in summary["spells"][0]
     assert [each for each in warnings_of(summary) if each.startswith("2.0 to 3.0 s: lost 2.0 to 3.0 s")]
-    assert "2.0 to 3.0 s" in spell_table(summary)
+    assert "2.0 to 3.0 s" in spell_list(summary)
 
 
 def test_the_longest_are_told_and_how_many_more_there_are(exact_run_data: RunData) -> None:
