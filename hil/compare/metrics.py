@@ -139,7 +139,14 @@ _FIRST = (
 _NO_METRICS = (
     *("seed", "agents", "duration_s", "noise", "runs", "worst_run", "kept", "log", "certificate", "law"),
     *("estimator", "sigma_position", "sigma_heading", "latency_s", "loss", "parameters", "stopped_by"),
-    *("estimation.evaluated_from_s", "bounds.checked", "bounds.assumed", "bounds.published.checked"),
+    *(
+        "estimation.evaluated_from_s",
+        "estimation.max_at_s",
+        "window",
+        "bounds.checked",
+        "bounds.assumed",
+        "bounds.published.checked",
+    ),
     *("bounds.published.says_something", "bounds.largest_errors_seen", "bounds.v_eps"),
     *("frames.used", "frames.published", "frames.received", "commands.sent", "cycles.count"),
     *("cycles.limit_ms",),

@@ -33,7 +33,8 @@ class EstimateColumns:
     """Estimates as arrays of shape (n,), ``sd`` (n, 5) of the quantities in the order of the covariance.
 
     ``seen`` is what the bounds need of them; units and signs as in ``LeaderEstimate.msg``. ``bounds`` (n, 3):
-    of v1, alpha1 and h as they were published, None for estimates that were not.
+    of v1, alpha1 and h as they were published, None for estimates that were not. ``computed_ns``: when each
+    was, which is never before its capture, nor before the one in front of it; None if that is not known.
     """
 
     capture_ns: Stamps
@@ -43,20 +44,24 @@ class EstimateColumns:
     nis: FloatArray
     sd: FloatArray
     bounds: FloatArray | None = None
+    computed_ns: Stamps | None = None
 
     @staticmethod
     def of(estimates: Sequence[LeaderEstimate]) -> EstimateColumns:
         """Columns of messages, in their order."""
         columns = np.array(list(map(_ESTIMATED, estimates)), dtype=np.float64).reshape(-1, 10).T
         variances = np.array([e.covariance[::6] for e in estimates], dtype=np.float64).reshape(-1, 5)
+        capture_ns = np.array([to_ns(e.header.stamp) for e in estimates], dtype=np.int64)
+        computed_ns = np.array([to_ns(e.computed) for e in estimates], dtype=np.int64)
         return EstimateColumns(
-            capture_ns=np.array([to_ns(e.header.stamp) for e in estimates], dtype=np.int64),
+            capture_ns=capture_ns,
             status=np.array([e.status for e in estimates], dtype=np.int64),
             seen=Perceived(*columns[:8]),
             u1=columns[8],
             nis=columns[9],
             sd=np.sqrt(np.maximum(variances, 0.0)),
             bounds=np.array(list(map(_BOUNDS, estimates)), dtype=np.float64).reshape(-1, 3),
+            computed_ns=_in_order(capture_ns, computed_ns),
         )
 
     @staticmethod
@@ -70,6 +75,7 @@ class EstimateColumns:
             nis=rows["nis"],
             sd=np.sqrt(np.maximum(np.column_stack([rows[f"var_{name}"] for name in QUANTITIES]), 0.0)),
             bounds=np.column_stack([rows[name] for name in _BOUND_NAMES]),
+            computed_ns=_in_order(rows["capture_ns"], rows["computed_ns"]),
         )
 
     def only(self, rows: NDArray[np.bool_]) -> EstimateColumns:
@@ -85,7 +91,18 @@ class EstimateColumns:
             nis=self.nis[rows],
             sd=self.sd[rows],
             bounds=None if self.bounds is None else self.bounds[rows],
+            computed_ns=None if self.computed_ns is None else self.computed_ns[rows],
         )
+
+    @property
+    def told_ns(self) -> Stamps:
+        """When each was told: what an estimate says of itself holds from then on, not from its capture."""
+        return self.capture_ns if self.computed_ns is None else self.computed_ns
+
+
+def _in_order(capture_ns: Stamps, computed_ns: Stamps) -> Stamps:
+    """Times of computation that go on as the estimates do; a clock that is set back does not."""
+    return np.maximum.accumulate(np.maximum(capture_ns, computed_ns))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from estimation.consistency.nees import effective_samples, nees_limits, normalised
@@ -17,6 +17,9 @@ TOLERATED = (0.5, 2.0)
 LEAST_EXPLAINED = 0.9
 """Of sound errors 99.7 % lie within three deviations; that a tenth lies outside happens in 1 of 37 runs at
 most, however alike the errors are (Markov's inequality)."""
+
+TELLING = 20.0
+"""Where the upper limit is so many times the lower one, errors count for too few samples to tell anything."""
 
 _EXACT = 1e-12
 """Who errs by a millionth of his deviations was given the truth, and what is left is rounding."""
@@ -39,16 +42,23 @@ def judge_nees(samples: EstimateColumns, errors: Mapping[str, FloatArray]) -> di
     return {"nees": nees, "nees_limits": limits}
 
 
+def are_telling(limits: Sequence[float]) -> bool:
+    """Whether limits are so narrow that a value outside of them says something."""
+    low, high = limits
+    return high <= TELLING * low
+
+
 def nees_finding(estimation: Mapping[str, Any]) -> str:
     """What is wrong with the deviations of the ``estimation`` of a summary, or a cell, in one line.
 
-    Errors that never change count for one sample, of which nearly any NEES could be; deviations are too small
-    all the same where they explain so few of the errors.
+    Errors that never change count for one sample, of which nearly any NEES could be: limits that are not
+    telling count as none. Deviations are too small all the same where they explain so few of the errors.
     """
     limits, covered = estimation.get("nees_limits", {}), estimation.get("coverage_3sigma", {})
     modest, confident = [], []
     for name, nees in estimation.get("nees", {}).items():
-        low, high = limits.get(name) or (0.0, math.inf)
+        given = limits.get(name)
+        low, high = given if given and are_telling(given) else (0.0, math.inf)
         share = covered.get(name, 1.0)
         expected = f" (expected {low:.2g} to {high:.2g})" if math.isfinite(high) else ""
         if nees < min(low, TOLERATED[0]):

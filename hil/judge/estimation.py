@@ -36,8 +36,9 @@ def judge_estimation(run_data: RunData, columns: Columns) -> dict[str, object]:
     ``settle_s``: from the start of the run (the leader sets off, or the first capture) to the capture of the
     first estimate that says TRACKING. ``nis_mean``: over the samples whose NIS is finite. ``rmse``, ``max``
     and ``coverage_3sigma`` (the share of errors within three of the estimate's own standard deviations): over
-    the samples at which the quantity's truth is known. ``efficiency``: RMSE over the root mean square of the
-    posterior Cramer-Rao bound at these samples; only for the world front end, whose noise it is about.
+    the samples at which the quantity's truth is known. ``max_at_s``: capture time of the largest error, in
+    seconds of the run. ``efficiency``: RMSE over the root mean square of the posterior Cramer-Rao bound at
+    these samples; only for the world front end, whose noise it is about.
     ``nees``, ``nees_limits``: see :func:`hil.judge.consistency.judge_nees`. Where smoothed tracks stand in
     for the truth, which err as much as good estimates, there are neither these nor coverage nor efficiency.
     """
@@ -53,7 +54,7 @@ def judge_estimation(run_data: RunData, columns: Columns) -> dict[str, object]:
         "settle_s": _settle(columns),
         "nis_mean": float(nis.mean()) if len(nis) else None,
         "rmse": rmse,
-        "max": {name: float(np.nanmax(np.abs(error))) for name, error in errors.items()},
+        **_largest(run_data, columns, errors),
     }
     if run_data.tracks is not None:
         return told
@@ -84,6 +85,18 @@ def errors_at(estimates: EstimateColumns, true: TrueStates) -> dict[str, FloatAr
         "u1": estimates.u1 - true.u1,
     }
     return {name: error for name, error in errors.items() if np.any(np.isfinite(error))}
+
+
+def _largest(
+    run_data: RunData, columns: Columns, errors: Mapping[str, FloatArray]
+) -> dict[str, dict[str, float]]:
+    """The largest errors, and when they were."""
+    rows = {name: int(np.nanargmax(np.abs(error))) for name, error in errors.items()}
+    at_ns = columns.samples.capture_ns
+    return {
+        "max": {name: float(abs(errors[name][row])) for name, row in rows.items()},
+        "max_at_s": {name: (int(at_ns[row]) - run_data.zero_ns) / 1e9 for name, row in rows.items()},
+    }
 
 
 def _settle(columns: Columns) -> float | None:

@@ -65,6 +65,8 @@ def run_data_of_replay(
     run_data = replace(
         found,
         mode="replay",
+        # Those of the log's own estimator: another one refuses other inputs.
+        troubles=found.troubles if played.parity else (),
         zero_ns=zero_ns,
         evaluate_from_ns=None if from_s is None else zero_ns + round(from_s * 1e9),
         evaluate_to_ns=None if to_s is None else zero_ns + round(to_s * 1e9),

@@ -28,6 +28,7 @@ from hil.log.origin import Origin, origin_of
 from hil.log.reader import Log, Record
 from hil.nodes.findings import Findings, all_found, findings_in
 from hil.nodes.noise_report import scale_in
+from hil.nodes.troubles import Trouble, troubles_of
 from hil.replay.kept import Kept, KeptReplay
 from hil.scenario.certificate import certificate_json, certificate_of
 from hil.scenario.certify import same_steps
@@ -75,6 +76,7 @@ class RunData:
     place of estimates, commands, truth and arrivals, which are empty then. ``law``: what is to be said of a
     law of one's own. ``noise_scale``: noise of positions as it was found over what was told, None if it was
     not looked for. ``found``: findings by the nodes' names, None where no node could have told any.
+    ``troubles``: what the estimator reported of its inputs over time.
     ``truth_of_bodies``: whether the truth in the log is of rigid bodies and not of the robots below.
     ``origin``: what the log tells of how it was made.
     ``tracks``: in the place of a truth that nobody knows, what the motion capture showed of a run with robots
@@ -106,6 +108,7 @@ class RunData:
     law: Mapping[str, Any] = field(default_factory=dict)
     noise_scale: float | None = None
     found: Mapping[str, Findings] | None = None
+    troubles: Sequence[Trouble] = ()
     truth_of_bodies: bool = False
     tracks: MocapTracks | None = None
     origin: Origin = field(default_factory=Origin)
@@ -218,6 +221,7 @@ def run_data_of_link(log: Log, link: Link) -> RunData:
         law=law_facts(log, counts.get(link.node_name("controller"), {})),
         noise_scale=scale_in(estimator),
         found=of_follower(all_found(map(findings_in, reports)), link) if reports else None,
+        troubles=troubles_of(reports, link.node_name("estimator")),
     )
     return replace(run_data, zero_ns=_zero_ns(log, run_data))
 
@@ -250,6 +254,7 @@ def run_data_of_kept(log: Log, replay: KeptReplay) -> RunData:
         kept=kept,
         noise_scale=replay.noise_scale,
         found=of_follower(kept.found, link) if kept.reports else None,
+        troubles=kept.troubles.get(link.node_name("estimator"), ()),
     )
     return replace(run_data, zero_ns=_zero_ns(log, run_data))
 

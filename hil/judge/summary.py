@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from formation.angles import FloatArray
 from hil.extensions.reference import short
 from hil.judge.assumptions import judge_assumptions
+from hil.judge.bad_spells import bad_spells
 from hil.judge.bounds import judge_bounds
 from hil.judge.certified import judge_certified
 from hil.judge.clock import arrival_rows, judge_clock
@@ -47,8 +48,10 @@ def summarise(run_data: RunData) -> dict[str, Any]:
     estimates are certified.
     ``law``: a name, of one's own more (:func:`hil.judge.made_by.law_json`).
     ``stopped_by``: who stopped the run before its time, and why; absent where nobody did.
+    ``spells``: when something was bad, and why (:mod:`hil.judge.bad_spells`).
     ``findings``: what nodes found to be wrong, and the judge (:mod:`hil.judge.findings`); absent where nobody
     could have told. ``orders_refused``: why the scenario's own orders to change sides were, if they were.
+    ``window``: when alone estimates, bounds, formation and spells are judged, where that was asked for.
     ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it, and ``certified`` hold
     no figures where ``noise`` says that the noise exceeds what they rest on.
     """
@@ -65,6 +68,7 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "estimator": short(given.estimator.kind),
         "law": law_json(given, run_data.law) if driven or len(columns.commands.issued_ns) else None,
         "duration_s": columns.run.seconds,
+        "window": _window(run_data, columns),
         "frames": _frames(run_data),
         "estimation": estimation,
         "bounds": judge_bounds(given, columns)
@@ -82,12 +86,21 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "commands": _commands(columns),
         "orders_refused": refusal(given) if driven else None,
         "stopped_by": stopped_by(run_data.found or {}),
+        "spells": bad_spells(run_data, columns),
         "findings": findings_list(run_data.found, judged_findings(estimation)),
         "rejected": dict(run_data.refused),
         "log": None if run_data.log is None else asdict(run_data.log),
     }
     result: dict[str, Any] = known(summary)
     return result
+
+
+def _window(run_data: RunData, columns: Columns) -> dict[str, float] | None:
+    """What is judged in seconds of the run, where that was asked for."""
+    if run_data.evaluate_from_ns is None and run_data.evaluate_to_ns is None:
+        return None
+    span, zero_ns = columns.span, run_data.zero_ns
+    return {"from_s": (span.from_ns - zero_ns) / 1e9, "to_s": (span.to_ns - zero_ns) / 1e9}
 
 
 def _frames(run_data: RunData) -> dict[str, int | None]:

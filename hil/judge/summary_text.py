@@ -10,8 +10,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from hil.judge.consistency import are_telling
 from hil.judge.made_by import law_failure, made_by
 from hil.judge.noise import noise_warnings
+from hil.judge.spell_words import said_by_spells, spell_lines
 from hil.log.report_json import result_console
 from hil.nodes.findings import finding_line
 
@@ -51,6 +53,7 @@ def warnings_by_part(summary: Mapping[str, Any]) -> dict[str, list[str]]:
     """What deserves a second look, by the part of a run that it is about."""
     law = filter(None, [law_failure(summary)])
     return {
+        "spells": [*spell_lines(summary)],
         "tracking": [*_estimation_warnings(summary)],
         "bounds": [
             *_bound_warnings(summary),
@@ -89,10 +92,16 @@ def verdict_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
 
 
 def judged_by(summary: Mapping[str, Any]) -> str:
-    """What a run was judged by in place of the truth; empty where that is known."""
-    if summary.get("truth") != "mocap":
-        return ""
-    return "by the smoothed mocap tracks, whose own errors are in what follows"
+    """What stood for the truth, and which part of a run was judged; empty for all of it by the truth."""
+    told = []
+    if summary.get("truth") == "mocap":
+        told.append("by the smoothed mocap tracks, whose own errors are in what follows")
+    if window := summary.get("window"):
+        told.append(
+            f"from {window['from_s']:.4g} to {window['to_s']:.4g} s only: estimates, bounds, formation, bad "
+            "spells; frames, latency, commands, inputs refused and findings are of the whole run"
+        )
+    return "; ".join(told)
 
 
 def parity_line(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
@@ -110,14 +119,22 @@ def _estimate_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]
     rmse = estimation.get("rmse", {})
     parts = []
     if "v1" in rmse:
-        parts.append(f"v1 {1e3 * rmse['v1']:.1f} mm/s")
+        parts.append(f"v1 {1e3 * rmse['v1']:.1f} mm/s{_largest(estimation, 'v1', 1e3)}")
     if "alpha1" in rmse:
-        parts.append(f"alpha1 {math.degrees(rmse['alpha1']):.2f} deg")
+        degrees = math.degrees(1.0)
+        parts.append(f"alpha1 {degrees * rmse['alpha1']:.2f} deg{_largest(estimation, 'alpha1', degrees)}")
     if parts:
         judged = f"({estimation['samples']} samples from {estimation['evaluated_from_s']:.3g} s on)"
         yield "estimate", f"RMSE {', '.join(parts)} {judged}", PLAIN
     yield from _nees_line(estimation)
     yield from _bound_lines(summary)
+
+
+def _largest(estimation: Mapping[str, Any], name: str, scale: float) -> str:
+    """The largest error of a quantity in its unit, and when it was, where that is known."""
+    if name not in estimation.get("max_at_s", {}):
+        return ""
+    return f" (largest {scale * estimation['max'][name]:.3g} at {estimation['max_at_s'][name]:.2f} s)"
 
 
 def _bound_lines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
@@ -149,7 +166,8 @@ def _nees_line(estimation: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     for name in ("v1", "alpha1", "u1"):
         if name in limits:
             low, high = limits[name]
-            parts.append(f"{name} {estimation['nees'][name]:.2f} ({low:.2f} to {high:.2f})")
+            expected = f"{low:.2f} to {high:.2f}" if are_telling(limits[name]) else "too short to tell"
+            parts.append(f"{name} {estimation['nees'][name]:.2f} ({expected})")
     if parts:
         yield "nees", f"squared errors over their variances: {', '.join(parts)}", PLAIN
 
@@ -228,8 +246,9 @@ def _estimation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     if not samples:
         yield "nothing to judge: no estimate was marked as tracking in the time that is judged"
         return
-    if untracked:
-        yield f"{untracked} of {samples + untracked} estimates did not say tracking; they are not judged"
+    if (elsewhere := untracked - said_by_spells(summary, "untracked")) > 0:
+        also = " besides" if elsewhere < untracked else ""
+        yield f"{elsewhere} of {samples + untracked} estimates did not say tracking{also}; none is judged"
     low = {
         name: share
         for name, share in estimation.get("coverage_3sigma", {}).items()
@@ -277,18 +296,27 @@ def _formation_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
 def _command_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     commands = summary.get("commands", {})
     sent = commands.get("sent", 0)
-    if commands.get("stopped", 0) > STOPPED_SHARE * sent:
-        share = f"{commands['stopped'] / sent:.0%}"
-        yield f"in {share} of the commands the robot was told to stand still after its first drive"
+    stopped = commands.get("stopped", 0) - said_by_spells(summary, "stopped")
+    if stopped > STOPPED_SHARE * sent:
+        share = f"{stopped / sent:.0%}"
+        where = _where(summary)
+        yield f"in {share} of the commands{where} the robot was told to stand still after its first drive"
     if commands.get("saturated", 0) > SATURATED_SHARE * sent:
-        yield f"{commands['saturated'] / sent:.0%} of the commands were at a limit of the robot"
+        share = f"{commands['saturated'] / sent:.0%}"
+        yield f"{share} of the commands{_where(summary)} were at a limit of the robot"
+
+
+def _where(summary: Mapping[str, Any]) -> str:
+    """What counts of the whole run are of, where less of it is judged."""
+    return " of the whole run" if summary.get("window") else ""
 
 
 def _wire_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     frames = summary.get("frames", {})
     lost, published = frames.get("lost", 0), frames.get("published", 0)
+    lost -= said_by_spells(summary, "frames_lost")
     if lost > LOST_SHARE * published:
-        yield f"{lost / published:.1%} of the frames never reached the estimator"
+        yield f"{lost / published:.1%} of the frames{_where(summary)} never reached the estimator"
     clock = summary.get("clock", {})
     if clock.get("jumps"):
         times = "once" if clock["jumps"] == 1 else f"{clock['jumps']} times"

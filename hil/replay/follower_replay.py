@@ -15,6 +15,7 @@ from hil.log.reader import Log
 from hil.nodes.controller import ControllerNode, ControllerState
 from hil.nodes.estimator import EstimatorNode, EstimatorState
 from hil.nodes.findings import Findings, all_found
+from hil.nodes.troubles import Trouble
 from hil.replay.kept import Array, Kept, KeptReplay
 from hil.replay.pair_desk import NEVER, Repeats, Roles
 from hil.replay.pair_rows import MOST_LOST, Capacity, Nodes, PairRows
@@ -211,8 +212,9 @@ class FollowerReplay:
         sides: Sequence[tuple[int, bytes]],
         reports: Mapping[str, Mapping[str, str]],
         found: Mapping[str, Findings],
+        troubles: Mapping[str, Sequence[Trouble]],
     ) -> KeptReplay:
-        """What was kept of it, orders to change sides, and what nodes reported and found."""
+        """What was kept of it, orders to change sides, and what nodes reported and found, and when."""
         rows, tally = self.rows, self.rows.tally()
         estimating, deciding = load(Repeats, rows.estimating, 0), load(Repeats, rows.deciding, 0)
         arrivals = rows.kept("arrivals", tally.arrivals)
@@ -227,6 +229,7 @@ class FollowerReplay:
             reports=reports,
             stopped_ns=None if tally.stopped_ns == NEVER else tally.stopped_ns,
             found=found,
+            troubles=troubles,
         )
         state = self.nodes.estimating
         if not self.same:

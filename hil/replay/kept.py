@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hil.nodes.findings import Findings
 from hil.nodes.node import Counts
+from hil.nodes.troubles import Trouble
 from hil.replay.re_execution import Parity
 from hil.scenario.links import Link
 from hil.scenario.schema import Scenario
@@ -24,8 +25,8 @@ class Kept:
     ``estimates``, ``commands``: as they came out of the replay, rows of :mod:`hil.replay.kept_rows`, and so
     are ``truths``, ``poses`` and ``motions``. ``arrivals``: frames that the estimator took in. ``sides``: log
     time and payload of orders to change them. ``reports``: the last values of every node by its name.
-    ``found``: what nodes reported to be wrong at any time, likewise. ``stopped_ns``: when the first stop was
-    logged.
+    ``found``: what nodes reported to be wrong at any time, likewise; ``troubles``: when.
+    ``stopped_ns``: when the first stop was logged.
     """
 
     estimates: Array
@@ -38,6 +39,7 @@ class Kept:
     reports: Mapping[str, Mapping[str, str]]
     stopped_ns: int | None
     found: Mapping[str, Findings] = field(default_factory=dict)
+    troubles: Mapping[str, Sequence[Trouble]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

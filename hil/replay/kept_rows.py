@@ -15,6 +15,7 @@ class EstimateRow(NamedTuple):
     """An estimate: numbers and units of ``LeaderEstimate.msg``, ``var_*`` the diagonal of the covariance."""
 
     capture_ns: int
+    computed_ns: int
     status: int
     rho: float
     alpha2: float
@@ -95,6 +96,7 @@ def estimate_row(n: EstimateNumbers, payload: bytes, covariance_at: int) -> Esti
     """What is kept of an estimate whose covariance stands in its payload."""
     return EstimateRow(
         n.capture_ns,
+        n.computed_ns,
         n.status,
         n.rho,
         n.alpha2,

@@ -130,9 +130,10 @@ class LogReplay:
         reports = self._reports.values()
         if reports is None:
             raise OddLogError
-        found = self._reports.found()
+        found, troubles = self._reports.found(), self._reports.troubles()
         return tuple(
-            each.result(self._orders.get(each.names.side, []), reports, found) for each in self.followers
+            each.result(self._orders.get(each.names.side, []), reports, found, troubles)
+            for each in self.followers
         )
 
     def looks_back(self) -> bool:

@@ -1,4 +1,4 @@
-"""The last report of every node in a log, and what any found, without decoding all the others."""
+"""The last report of every node in a log, and what any found and refused, without decoding all the others."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import struct
 
 from hil.log.reader import Log, Record
 from hil.nodes.findings import all_found, findings_in
+from hil.nodes.troubles import REFUSED, Trouble, troubles_in
 from hil.wire import topics
 from hil.wire.finding_keys import PREFIX
 from hil.wire.message_types import DiagnosticArray
 from hil.wire.messages import MalformedPayloadError, to_ns
 
 _UINT32 = struct.Struct("<I")
-_PREFIX = PREFIX.encode()
+_PREFIX, _REFUSED = PREFIX.encode(), REFUSED.encode()
 _FRAME_AT, _PLAIN = 12, b"\x00\x01"
 
 
@@ -24,18 +25,25 @@ class LastReports:
         self._typename = log.topics.get(topics.DIAGNOSTICS, "")
         self._last: dict[bytes, bytes] = {}
         self._found: dict[str, dict[str, str]] = {}
+        self._troubles: dict[str, list[Trouble]] = {}
 
     def hear(self, payload: bytes) -> None:
         """Take one in the place of the one before of the same nodes."""
         key = _who(payload)
         self._last.pop(key, None)
         self._last[key] = payload
-        if _PREFIX in payload and (report := self._decoded(payload)) is not None:
+        if (_PREFIX in payload or _REFUSED in payload) and (report := self._decoded(payload)) is not None:
             self._found = all_found([self._found, findings_in(report)])
+            for node, trouble in troubles_in(report).items():
+                self._troubles.setdefault(node, []).append(trouble)
 
     def found(self) -> dict[str, dict[str, str]]:
         """Findings of all reports by the nodes' names; nodes that never had any may be left out."""
         return self._found
+
+    def troubles(self) -> dict[str, list[Trouble]]:
+        """Troubles of all reports that tell of any, by the nodes' names."""
+        return self._troubles
 
     def _decoded(self, payload: bytes) -> DiagnosticArray | None:
         try:

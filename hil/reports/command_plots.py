@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from formation.angles import FloatArray
 from hil.figures.plot_data import LONGEST_LINE, PlotData
 from hil.judge.columns import inside
+from hil.judge.intervals import TimeInterval, intervals_of
 from hil.reports.colours import FOLLOWER, GREY, LIMIT
-from hil.reports.intervals import TimeInterval, intervals_of
 from hil.reports.plot_models import Field, Figure, Model, Value, source_of
 from hil.reports.plots import Key, Panel, TimeAxis, draw_level, draw_line, hover, limits_around, table
 

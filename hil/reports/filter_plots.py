@@ -10,10 +10,10 @@ from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
 from hil.figures.plot_data import LONGEST_LINE, PlotData
 from hil.judge.columns import inside
+from hil.judge.intervals import intervals_of
 from hil.judge.summary import percentile
 from hil.reports.colours import BELIEVED, BLACK, BOUND, FOLLOWER, GREY, PURPLE
 from hil.reports.decimation import decimated_rows
-from hil.reports.intervals import intervals_of
 from hil.reports.plot_models import Field, Model, Value, source_of
 from hil.reports.plots import Key, Panel, TimeAxis, draw_level, draw_line, draw_marks, hover, marks, table
 
@@ -32,15 +32,24 @@ _ROW_HEIGHT, _AXIS_HEIGHT = 30, 90
 
 
 def status_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
-    """What the estimates said of themselves; None without any."""
-    estimates = data.columns.estimates
-    during = inside(estimates.capture_ns, data.columns.run)
+    """What the estimates said of themselves, from when each said so; None without any.
+
+    Not by their captures: all that are told while no frame comes are of the last one before.
+    """
+    estimates, run = data.columns.estimates, data.columns.run
+    during = inside(estimates.told_ns, run)
     if not np.any(during):
         return None
     statuses = [Status(code) for code in estimates.status[during].tolist()]
     names = [status.name.lower() for status in statuses]
-    intervals = intervals_of(data.seconds(estimates.capture_ns[during]), names, LONGEST_LINE)
+    intervals = intervals_of(data.seconds(estimates.told_ns[during]), names, LONGEST_LINE)
     occurring = [status for status in Status if status in statuses]
+    lasted = {
+        status: sum(each.to_s - each.from_s for each in intervals if each.what == status.name.lower())
+        for status in occurring
+    }
+    # All may be told at one moment, as those of a single frame are.
+    whole = sum(lasted.values()) or 1.0
     rows = [status.name.lower() for status in reversed(occurring)]
     plot = axis.panel("", rows, _AXIS_HEIGHT + _ROW_HEIGHT * len(rows))
     plot.set(min_border_left=78)
@@ -58,8 +67,9 @@ def status_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
         bars = plot.add_glyph(source_of(held), Model("HBar", **place, **looks))
         tips = {"status": "@row", "from": "@from{0.00} s", "to": "@to{0.00} s", "estimates": "@count"}
         hover(plot, bars, tips, mode="mouse")
-    shares = ", ".join(f"{s.name.lower()} {statuses.count(s) / len(statuses):.1%}" for s in occurring)
-    return Panel("Status", f"What the estimates said of themselves: {shares}.", (), plot, anchor="status")
+    shares = ", ".join(f"{status.name.lower()} {lasted[status] / whole:.1%}" for status in occurring)
+    says = f"What the estimates said of themselves, of the time: {shares}."
+    return Panel("Status", says, (), plot, anchor="status")
 
 
 def nis_panel(data: PlotData, axis: TimeAxis) -> Panel | None:

@@ -11,12 +11,13 @@ import numpy as np
 
 from formation.angles import FloatArray
 from hil.figures.plot_data import LONGEST_LINE
-from hil.reports.colours import AXIS, DARK, GREY, GRID, SHADE
+from hil.reports.colours import AXIS, BOUND, DARK, GREY, GRID, SHADE
 from hil.reports.decimation import decimated_rows
 from hil.reports.page_script import NOW
 from hil.reports.plot_models import DASHES, Field, Figure, Model, Value, source_of
 
 HEIGHT = 210
+_MOST_SHADED = 20
 _FONT = "system-ui, sans-serif"
 
 
@@ -47,11 +48,15 @@ class Panel:
 class TimeAxis:
     """The time that all panels of a page share: they zoom together, and one cursor runs through all.
 
-    ``first``, ``last``: what is shown to begin with [s]. Before ``judged_from`` it is shaded.
+    ``first``, ``last``: what is shown to begin with [s]. Before ``judged_from`` it is shaded, and so are
+    ``spells``, from when to when [s], the longest if there are many.
     """
 
-    def __init__(self, first: float, last: float, judged_from: float) -> None:
+    def __init__(
+        self, first: float, last: float, judged_from: float, spells: Sequence[tuple[float, float]] = ()
+    ) -> None:
         self.first, self.last, self.judged_from = first, last, judged_from
+        self.spells = sorted(spells, key=lambda spell: spell[0] - spell[1])[:_MOST_SHADED]
         self._range = Model("Range1d", start=first, end=last if last > first else first + 1.0)
         self._cursor = Model("Span", dimension="height", line_color=GREY, line_dash=DASHES["dotted"])
         self._now = Model(
@@ -78,6 +83,9 @@ class TimeAxis:
             up = [y[0], y[0], y[1], y[1]]
             looks = {"fill_color": SHADE, "fill_alpha": 0.05, "line_alpha": 0.0, "level": "image"}
             plot.add_layout(Model("PolyAnnotation", xs=across, ys=up, **looks))
+        for left, right in self.spells:
+            looks = {"fill_color": BOUND, "fill_alpha": 0.1, "line_alpha": 0.0, "level": "image"}
+            plot.add_layout(Model("BoxAnnotation", left=left, right=right, **looks))
         return plot
 
 
@@ -146,9 +154,32 @@ def draw_line(
 
 
 def draw_band(plot: Figure, source: Model, low: str, high: str, colour: str) -> None:
-    """What lies between two columns, filled."""
-    area = Model("VArea", x=Field("t"), y1=Field(low), y2=Field(high), fill_color=colour, fill_alpha=0.18)
-    plot.add_glyph(source, area)
+    """What lies between two columns, filled, and broken where these are."""
+    looks = {"fill_color": colour, "fill_alpha": 0.18}
+    held = source.attributes["data"]
+    t, lower, upper = (np.asarray(held[name]) for name in ("t", low, high))
+    if np.all(np.isfinite(lower) & np.isfinite(upper)):
+        plot.add_glyph(source, Model("VArea", x=Field("t"), y1=Field(low), y2=Field(high), **looks))
+        return
+    # An area of Bokeh's goes straight through what is not known; the outline of several parts does not.
+    x, y = _outlines(t, lower, upper)
+    plot.add_glyph(
+        source_of({"x": x, "y": _short(y)}),
+        Model("Patch", x=Field("x"), y=Field("y"), **looks, line_alpha=0.0),
+    )
+
+
+def _outlines(t: FloatArray, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Outlines of a band with NaN between its parts: there along the lower side, back along the upper one."""
+    known = np.isfinite(lower) & np.isfinite(upper)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(np.int8)))
+    gap = np.array([math.nan])
+    x: list[FloatArray] = []
+    y: list[FloatArray] = []
+    for first, end in edges.reshape(-1, 2).tolist():
+        x += [t[first:end], t[first:end][::-1], gap]
+        y += [lower[first:end], upper[first:end][::-1], gap]
+    return np.concatenate([gap, *x]), np.concatenate([gap, *y])
 
 
 def draw_level(plot: Figure, value: float, colour: str, dash: str) -> None:

@@ -8,6 +8,7 @@ from html import escape
 from typing import Any
 
 from hil.judge.certified import certified_violations
+from hil.judge.spell_words import longest_first, times_of
 from hil.judge.summary_text import extended_violations, judged_by, parity_line, warnings_by_part
 from hil.reports.notation import written
 
@@ -16,6 +17,7 @@ _SIGNS = {GOOD: ("✓", "good: "), WARN: ("!", "look again: "), BAD: ("✗", "ba
 _FAR = 0.5
 """Who is further off his station than this share of the least distance is not in formation, noise or not."""
 PLACES = {
+    "spells": "bad-spells",
     "bounds": "bounds",
     "formation": "formation",
     "saturation": "commands",
@@ -25,6 +27,7 @@ PLACES = {
     "replay": "how-it-was-made",
 }
 """Sections of the page by what is judged."""
+_NAMES = {"spells": "bad spells"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +43,7 @@ def reasons_of(summary: Mapping[str, Any]) -> list[Reason]:
     """What speaks for a run and against it; a part of which nothing is known is left out."""
     warned = warnings_by_part(summary)
     told = {
+        "spells": _spells(summary),
         "bounds": _bounds(summary),
         "formation": _formation(summary),
         "saturation": _saturation(summary),
@@ -66,7 +70,7 @@ def verdict_html(summary: Mapping[str, Any]) -> str:
     rows = "".join(
         f'<li><span class="{reason.style}" aria-hidden="true">{_SIGNS[reason.style][0]}</span>'
         f'<a href="#{PLACES[reason.part]}"><span class="hidden">{_SIGNS[reason.style][1]}</span>'
-        f"{reason.part}</a><span>{escape(written(reason.text))}</span></li>"
+        f"{_NAMES.get(reason.part, reason.part)}</a><span>{escape(written(reason.text))}</span></li>"
         for reason in reasons
     )
     return (
@@ -102,16 +106,37 @@ def _verdict(reasons: Sequence[Reason]) -> tuple[str, str]:
     if wrong:
         told = "; ".join(f"{reason.part}: {written(reason.text)}" for reason in wrong)
         return BAD, f"{told[0].upper()}{told[1:]}."
-    doubtful = [reason.part for reason in reasons if reason.style == WARN]
+    doubtful = [reason.part for reason in reasons if reason.style == WARN and reason.part != "spells"]
+    spells = next((reason.text for reason in reasons if reason.part == "spells"), "")
     kept = any(reason.part == "bounds" and reason.style == GOOD for reason in reasons)
     held = "All bounds held" if kept else ""
+    if spells:
+        also = f" {_listed(doubtful)} {_deserve(doubtful)} a second look too." if doubtful else ""
+        begun = "All bounds held, but there" if kept else "There"
+        return WARN, f"{begun} was a bad spell: {spells}.{also[:2].upper()}{also[2:]}"
     if doubtful:
-        named = " and ".join(filter(None, [", ".join(doubtful[:-1]), doubtful[-1]]))
-        deserve = f"{named} {'deserve' if len(doubtful) > 1 else 'deserves'} a second look."
+        deserve = f"{_listed(doubtful)} {_deserve(doubtful)} a second look."
         if held:
             return WARN, f"{held}, but {deserve}"
         return WARN, f"{deserve[0].upper()}{deserve[1:]}"
     return GOOD, f"{held}, and nothing speaks against the run." if held else "Nothing speaks against the run."
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+
+
+def _deserve(names: Sequence[str]) -> str:
+    return "deserve" if len(names) > 1 else "deserves"
+
+
+def _spells(summary: Mapping[str, Any]) -> Reason | None:
+    """The longest of the bad spells, with how it began, and how many more there were."""
+    spells = longest_first(summary.get("spells", []))
+    if not spells:
+        return None
+    more = f", and {len(spells) - 1} more" if len(spells) > 1 else ""
+    return Reason("spells", WARN, f"{times_of(spells[0])}, {spells[0]['causes'][0]}{more}")
 
 
 def _bounds(summary: Mapping[str, Any]) -> Reason | None:
@@ -176,8 +201,9 @@ def _latency(summary: Mapping[str, Any]) -> Reason | None:
     frames = summary.get("frames", {})
     parts = []
     if waits:
+        largest = "largest of those that came" if frames.get("lost") else "largest"
         parts.append(
-            f"{waits['p50']:.1f} ms (median), {waits['p99']:.1f} (99 %), {waits['max']:.1f} (largest)"
+            f"{waits['p50']:.1f} ms (median), {waits['p99']:.1f} (99 %), {waits['max']:.1f} ({largest})"
         )
     if frames.get("lost"):
         parts.append(f"{frames['lost']} of {frames['published']} frames lost")

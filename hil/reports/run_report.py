@@ -20,6 +20,7 @@ from hil.reports.provenance import provenance_html
 from hil.reports.reasons import finding_name, verdict_html, warnings_html
 from hil.reports.run_tables import stops_table, summary_tables
 from hil.reports.shape_plots import COURSE, shape_panels
+from hil.reports.spell_list import spell_list
 from hil.reports.track_plot import track_panel
 
 _READOUT = (("rho", "ρ", "m", 3), ("alpha1", "α₁", "deg", 1), ("alpha2", "α₂", "deg", 1))
@@ -32,7 +33,9 @@ def run_report(data: PlotData, summary: Mapping[str, Any]) -> str:
     """
     run, span = data.columns.run, data.columns.span
     moments = data.seconds(np.array([run.from_ns, run.to_ns, span.from_ns]))
-    axis = TimeAxis(*moments.tolist())
+    spells = [(spell["from_s"], spell["to_s"]) for spell in summary.get("spells", [])]
+    first, last, judged_from = moments.tolist()
+    axis = TimeAxis(first, last, judged_from, spells)
     shapes = shape_panels(data, axis)
     readout = [(symbol, unit, digits, COURSE + name) for name, symbol, unit, digits in _READOUT if shapes]
     title = f"{' · '.join(_names(summary))} – abreast"
@@ -54,6 +57,7 @@ def _sections(
         return Section(heading, f"{warned}{html}", panels, below=tables.get(place, ""), anchor=place)
 
     return [
+        Section("Bad spells", spell_list(summary)),
         Section("At a glance", panels=glance, below=_shaded(axis) if glance else "", quiet=True),
         part("Formation", "formation", panels=shapes[2:]),
         part(
@@ -83,6 +87,8 @@ def _shaded(axis: TimeAxis) -> str:
     says = "All plots over time zoom together."
     if axis.judged_from > axis.first:
         says = f"What is shaded in the plots, before {axis.judged_from:.3g} s, is not judged. {says}"
+    if axis.spells:
+        says = f"Bad spells are shaded in red. {says}"
     return f'<p class="soft">{says}</p>'
 
 
@@ -106,7 +112,11 @@ def _findings(summary: Mapping[str, Any]) -> str:
         f"<dd>{escape(written(str(finding['text'])))}; {escape(str(finding['advice']))}</dd>"
         for finding in summary["findings"]
     )
-    return f"<dl>{listed}</dl>" if listed else "<p>Nothing was found to be wrong.</p>"
+    if listed:
+        return f"<dl>{listed}</dl>"
+    if summary.get("spells"):
+        return '<p>Nodes and judge named no cause; see <a href="#bad-spells">the bad spells</a>.</p>'
+    return "<p>Nothing was found to be wrong.</p>"
 
 
 def _names(summary: Mapping[str, Any]) -> list[str]:

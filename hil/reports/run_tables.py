@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import degrees
 from typing import Any
 
+from hil.judge.consistency import are_telling
+from hil.judge.intervals import TimeInterval
 from hil.reports.certificate_table import certificate_html
 from hil.reports.figure_labels import BOUNDED, LABELS
-from hil.reports.intervals import TimeInterval
 from hil.reports.notation import written
 from hil.reports.page import table_html
 
@@ -37,7 +38,7 @@ _COUNTS = {
 }
 _ELSEWHERE = (
     *("scenario", "seed", "mode", "estimator", "law", "duration_s", "truth", "findings", "orders_refused"),
-    *("log.", "law.", "parity.", "stopped_by."),
+    *("spells", "window.", "log.", "law.", "parity.", "stopped_by."),
 )
 """What other parts of the page say."""
 
@@ -102,17 +103,23 @@ def _estimates(left: dict[str, Any]) -> list[str]:
     errors = {
         "rmse": ("RMSE", _number),
         "max": ("largest", _number),
+        "max_at_s": ("at [s]", lambda at_s: f"{at_s:.2f}"),
         "efficiency": ("× bound for random leaders", _number),
     }
     deviations = {
         "coverage_3sigma": ("within 3 σ", lambda share: f"{share:.2%}"),
         "nees": ("NEES", _number),
-        "nees_limits": ("expected", lambda limits: " to ".join(map(_number, limits))),
+        "nees_limits": ("expected", _expected),
     }
     return [
         _by_quantity(left, f"Errors of the estimates {over}", errors),
         _by_quantity(left, f"Errors against their deviations {over}", deviations),
     ]
+
+
+def _expected(limits: Sequence[float]) -> str:
+    """Where a NEES is expected, if that says anything."""
+    return " to ".join(map(_number, limits)) if are_telling(limits) else "too short to tell"
 
 
 def _by_quantity(left: dict[str, Any], caption: str, columns: _Columns) -> str:

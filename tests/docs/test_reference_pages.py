@@ -24,6 +24,8 @@ ELSEWHERE = {
     "law.failed",
     "law.failure",
     "truth",
+    "window.from_s",
+    "window.to_s",
     "stopped_by",
     "orders_refused",
     "certified.failed.ASSUMPTION",

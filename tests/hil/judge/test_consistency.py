@@ -60,6 +60,16 @@ def test_errors_that_never_change_are_found_by_how_few_are_explained() -> None:
     assert "too confident: u1 7.3 (58% within 3 deviations" in said
 
 
+def test_limits_that_say_nothing_lead_to_no_finding_and_are_said_to_be_none() -> None:
+    told: dict[str, Any] = {"nees": {"v1": 13.0}, "nees_limits": {"v1": [0.0, 12.63]}}
+    assert not nees_finding(told)
+    assert not nees_finding({"nees": {"v1": 0.01}, "nees_limits": {"v1": [0.04, 4.0]}})
+    assert nees_finding({"nees": {"v1": 0.01}, "nees_limits": {"v1": [0.2, 3.9]}})
+    given = {"estimation": told, "bounds": {}, "mode": "lockstep", "scenario": "a", "duration_s": 1.0}
+    lines = {name: text for name, text, _ in verdict_lines(given | {"estimator": "ekf"})}
+    assert lines["nees"].endswith("v1 13.00 (too short to tell)")
+
+
 def test_without_truth_nothing_is_said(exact_run_data: RunData) -> None:
     columns = columns_of(exact_run_data)
     found: dict[str, Any] = judge_nees(columns.samples, {})

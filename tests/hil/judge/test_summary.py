@@ -55,7 +55,7 @@ def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
         "frames": {"published", "received", "used", "lost", "late", "rejected"},
         "estimation": {
             *("evaluated_from_s", "samples", "untracked", "settle_s", "nis_mean"),
-            *("rmse", "max", "efficiency", "coverage_3sigma", "nees", "nees_limits"),
+            *("rmse", "max", "max_at_s", "efficiency", "coverage_3sigma", "nees", "nees_limits"),
         },
         "bounds": {
             *("M_rho", "M_alpha2", "v_eps", "checked", "violations", "tightness"),
@@ -81,6 +81,7 @@ def test_a_run_has_all_the_keys_of_the_contract(judged: dict[str, Any]) -> None:
         "law",
         "duration_s",
         "findings",
+        "spells",
     }
     for name in ("rmse", "max", "efficiency", "coverage_3sigma", "nees", "nees_limits"):
         assert set(judged["estimation"][name]) == QUANTITIES
@@ -208,7 +209,7 @@ def test_what_nobody_knows_is_absent(exact_run_data: RunData) -> None:
     summary = summarise(without_truth(exact_run_data))
     assert set(summary) == {
         *("scenario", "mode", "estimator", "duration_s", "frames", "estimation", "bounds", "log"),
-        "certificate",
+        *("certificate", "spells"),
     }
     assert set(summary["estimation"]) == {
         *("evaluated_from_s", "samples", "untracked", "settle_s", "nis_mean")

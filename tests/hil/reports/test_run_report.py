@@ -11,6 +11,7 @@ from html import unescape
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import pytest
 from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
@@ -24,8 +25,8 @@ from hil.judge.summary import summarise
 from hil.log.reader import Log
 from hil.nodes.findings import advice_on
 from hil.reports.colours import DARK, DARKENED
-from hil.reports.filter_plots import latency_panel
-from hil.reports.plots import TimeAxis
+from hil.reports.filter_plots import latency_panel, status_panel
+from hil.reports.plots import TimeAxis, draw_band, table
 from hil.reports.run_report import run_report
 from hil.wire.message_types import CertifiedEstimate
 from hil.wire.messages import to_ns, to_time
@@ -33,6 +34,7 @@ from tests.hil.reports.open_page import PATIENCE, open_page
 
 NAN = math.nan
 LARGEST_BYTES = 3_000_000
+SHADED = '"name":"BoxAnnotation"'
 
 
 def report(run_data: RunData) -> str:
@@ -279,3 +281,56 @@ def test_what_was_found_is_told_with_what_to_do(exact_run_data: RunData) -> None
     assert "! look again: findings odometry silent" in words(page)
     assert "<3 s>" not in page
     assert "[{" not in words(page)
+
+
+def test_statuses_are_drawn_from_when_they_were_told(exact_run_data: RunData) -> None:
+    estimates = list(exact_run_data.estimates)
+    for row in range(120, 180):  # told for a second, all of the last frame before
+        estimates[row] = replace(estimates[row], header=estimates[119].header, status=int(Status.LOST))
+    panel = status_panel(PlotData.of(replace(exact_run_data, estimates=estimates)), TimeAxis(0.0, 4.0, 0.0))
+    assert panel is not None
+    assert "tracking 74.9%, lost 25.1%" in panel.says
+    bars = [each.attributes["data_source"].attributes["data"] for each in panel.plot.attributes["renderers"]]
+    (lost,) = [each for each in bars if each["row"] == ["lost"]]
+    assert [*lost["from"], *lost["to"]] == [pytest.approx(2.0, abs=0.01), pytest.approx(3.0, abs=0.01)]
+
+
+def test_bands_are_broken_where_lines_are() -> None:
+    t = np.array([0.0, 0.1, 0.2, 2.0, 2.1])
+    axis = TimeAxis(0.0, 3.0, 0.0)
+    whole, broken = axis.panel("y", (0.0, 1.0)), axis.panel("y", (0.0, 1.0))
+    draw_band(whole, table(t[:3], t[:3], {"low": t[:3], "high": 1.0 + t[:3]}), "low", "high", DARK)
+    draw_band(broken, table(t, t, {"low": t, "high": 1.0 + t}), "low", "high", DARK)
+    (area,) = whole.attributes["renderers"]
+    assert area.attributes["glyph"].kind == "VArea"
+    (patch,) = broken.attributes["renderers"]
+    assert patch.attributes["glyph"].kind == "Patch"
+    held = patch.attributes["data_source"].attributes["data"]
+    nan = math.nan
+    assert held["x"] == pytest.approx(
+        [nan, 0.0, 0.1, 0.2, 0.2, 0.1, 0.0, nan, 2.0, 2.1, 2.1, 2.0, nan], nan_ok=True
+    )
+    assert held["y"] == pytest.approx(
+        [nan, 0.0, 0.1, 0.2, 1.2, 1.1, 1.0, nan, 2.0, 2.1, 3.1, 3.0, nan], nan_ok=True
+    )
+
+
+def test_bad_spells_are_told_first_and_shaded_in_all_plots_over_time(exact_run_data: RunData) -> None:
+    estimates = list(exact_run_data.estimates)
+    for row in range(120, 180):
+        estimates[row] = replace(estimates[row], header=estimates[119].header, status=int(Status.LOST))
+    page = report(replace(exact_run_data, estimates=estimates))
+    said = words(page)
+    assert "All bounds held, but there was a bad spell: 2.0 to 3.0 s, no frame used for 1.0 s" in said
+    assert "look again: bad spells 2.0 to 3.0 s" in said
+    assert said.index("When something was bad, and why") < said.index("From above")
+    assert "Bad spells are shaded in red." in said
+    assert "Nodes and judge named no cause; see the bad spells ." in said
+    assert page.count(SHADED) == len(titles(page)) - 1  # all but the tracks from above
+    assert 'id="bad-spells"' in page
+
+
+def test_a_good_run_has_no_bad_spells(exact_run_data: RunData) -> None:
+    page = report(exact_run_data)
+    assert "bad spells" not in words(page)
+    assert SHADED not in page

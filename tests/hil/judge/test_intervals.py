@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil.reports.intervals import TimeInterval, intervals_of
+from hil.judge.intervals import TimeInterval, intervals_of
 
 
 def test_an_interval_lasts_until_the_next_sample_but_not_through_a_silence() -> None:
