@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -52,11 +53,19 @@ def reasons_of(summary: Mapping[str, Any]) -> list[Reason]:
     for part, reason in told.items():
         if reason is None and not warned.get(part):
             continue
-        reason = reason or Reason(part, WARN, "look again")
-        if warned.get(part) and reason.style != BAD:
-            reason = Reason(part, WARN, reason.text)
-        reasons.append(reason)
+        reasons.append(_doubted(part, reason, warned.get(part, ())))
     return reasons
+
+
+def _doubted(part: str, reason: Reason | None, warnings: Sequence[str]) -> Reason:
+    """A reason with what makes one look again, where its own text does not say so."""
+    brief = "; ".join(re.split(r" \(|[:;] ", warning, maxsplit=1)[0] for warning in warnings)
+    if reason is None:
+        return Reason(part, WARN, brief)
+    if not warnings or reason.style == BAD:
+        return reason
+    says = reason.style == WARN
+    return Reason(part, WARN, reason.text if says else f"{reason.text}; {brief}")
 
 
 def verdict_html(summary: Mapping[str, Any]) -> str:
