@@ -84,6 +84,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "emulator": ("abreast emulator turtlebot3", "abreast emulator turtlebot3 --natnet"),
     "follower": (
         "abreast follower my_lab.toml --connect tcp/192.0.2.10:7447",
+        "abreast follower my_lab.toml --needs recorder",
         "abreast follower my_lab.toml --certify --secure keys",
     ),
     "estimator": ("abreast estimator my_lab.toml", "abreast estimator my_lab.toml --set estimator.kind=ukf"),
