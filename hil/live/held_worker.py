@@ -14,12 +14,16 @@ from hil.wire.events import Event
 from hil.wire.messages import MalformedPayloadError
 from hil.wire.topics import link_topics
 
+_PATIENCE_NS = 1_000_000_000
+"""Who is there reports every half second; whoever has not by now is told to be waited for."""
+
 
 class HeldWorker:
     """Keeps measurements from a worker until all that it ``needs`` have said that they are well.
 
     Orders go through at any time, and so do ticks: until then nodes say that they wait, and robots stand.
-    Who is there once is not waited for again. ``say``: told once what is waited for, and that it is over.
+    Who is there once is not waited for again. ``say``: told once what is waited for, if that takes long, and
+    that it is over.
     """
 
     def __init__(
@@ -29,14 +33,14 @@ class HeldWorker:
         self._barrier, self._present = StartBarrier(needs, links), NOBODY
         self._orders = {topics.STOP, topics.ARM, *(link_topics(link).side for link in links)}
         self._hears = frozenset(worker.subscribes)
-        self._is_held = True
+        self._is_held, self._is_told, self._tell_ns = True, False, 0
         self.subscribes = tuple(dict.fromkeys((*worker.subscribes, topics.DIAGNOSTICS)))
         self.thorough = worker.thorough
 
     def begin(self, now_ns: int) -> None:
-        """Come up, and say who is waited for."""
+        """Come up."""
         self._worker.begin(now_ns)
-        self._say(f"uses no measurements before it hears that all is well with {self._whom()}")
+        self._tell_ns = now_ns + _PATIENCE_NS
 
     def due_ns(self) -> int:
         """When the worker wants to be woken."""
@@ -49,7 +53,11 @@ class HeldWorker:
                 self._present = self._barrier.heard(self._present, event.payload)
             if self._present.well >= self._barrier.needs:
                 self._is_held = False
-                self._say(f"all is well with {self._whom()}: begins")
+                if self._is_told:
+                    self._say(f"all is well with {self._whom()}: begins")
+        elif self._is_held and not self._is_told and now_ns >= self._tell_ns:
+            self._is_told = True
+            self._say(f"uses no measurements before it hears that all is well with {self._whom()}")
         if event.topic and event.topic not in self._hears:
             return ()
         if self._is_held and event.topic and event.topic not in self._orders:
