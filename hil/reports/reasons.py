@@ -16,6 +16,8 @@ GOOD, WARN, BAD, PLAIN = "good", "warn", "bad", "soft"
 _SIGNS = {GOOD: ("✓", "good: "), WARN: ("!", "look again: "), BAD: ("✗", "bad: "), PLAIN: ("·", "")}
 _FAR = 0.5
 """Who is further off his station than this share of the least distance is not in formation, noise or not."""
+_SHORT = 60
+"""A warning of so many letters is told in full."""
 PLACES = {
     "bounds": "bounds",
     "formation": "formation",
@@ -59,7 +61,7 @@ def reasons_of(summary: Mapping[str, Any]) -> list[Reason]:
 
 def _doubted(part: str, reason: Reason | None, warnings: Sequence[str]) -> Reason:
     """A reason with what makes one look again, where its own text does not say so."""
-    brief = "; ".join(re.split(r" \(|[:;] ", warning, maxsplit=1)[0] for warning in warnings)
+    brief = "; ".join(map(_brief, warnings))
     if reason is None:
         return Reason(part, WARN, brief)
     if not warnings or reason.style == BAD:
@@ -205,6 +207,11 @@ def _replay(summary: Mapping[str, Any]) -> Reason | None:
     for _, text, style in found:
         return Reason("replay", GOOD if style == "green" else BAD, text)
     return None
+
+
+def _brief(warning: str) -> str:
+    """A warning without what it adds in brackets or after a colon, if it is long."""
+    return warning if len(warning) <= _SHORT else re.split(r" \(|[:;] ", warning, maxsplit=1)[0]
 
 
 def _times(count: int) -> str:

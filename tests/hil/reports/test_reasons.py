@@ -58,6 +58,8 @@ def test_what_to_look_at_again_is_said_in_few_words(summary: dict[str, Any]) -> 
     assert told["bounds"].endswith(
         "; inputs err as little as the scenario assumes in 64% of the samples only"
     )
+    summary["rejected"] = {"follower_outlier": 8, "gated": 5}
+    assert reasons_of(summary)[4].text.endswith("; inputs refused: follower outlier 8, gated 5")
     assert told["latency"].endswith("; 10.0% of the frames never reached the estimator")
 
 
