@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,6 +21,9 @@ from hil.scenario.certify import CERTIFY
 from hil.scenario.files import load_scenario
 from hil.scenario.guarded import with_guards
 from hil.scenario.links import HOSTED, link_of, links_of
+
+if TYPE_CHECKING:
+    from hil.live.daemon import Worker
 
 
 def daemon_command(name: str, summary: str) -> click.Command:
@@ -76,7 +79,7 @@ def daemon_command(name: str, summary: str) -> click.Command:
 
         prepare(types_of(chosen).values())
         dropped = run_daemon(
-            collector_paused()(lambda: WORKERS[name](order)),
+            collector_paused()(lambda: _made(name, order)),
             chosen,
             endpoints,
             ending,
@@ -99,6 +102,8 @@ def daemon_command(name: str, summary: str) -> click.Command:
             click.Option(["--out"], type=OutputFile(), required=True, help="Log to write (.mcap).")
         )
     if name in HOSTED:
+        needs = "Daemons that must be well before it uses measurements, by commas, such as recorder."
+        options.append(click.Option(["--needs"], default="", help=needs))
         whom = "A follower of a chain to serve, by its name; may be given again. Without it all."
         options.append(click.Option(["--follower", "followers"], multiple=True, metavar="NAME", help=whom))
     if name in ("follower", "estimator"):
@@ -114,6 +119,15 @@ def daemon_command(name: str, summary: str) -> click.Command:
     if name == "emulator":
         options += natnet_options()
     return click.Command(name, callback=callback, params=options, help=f"Run {summary}.")
+
+
+def _made(name: str, order: Order) -> Worker:
+    worker = WORKERS[name](order)
+    if name not in HOSTED or not order.needs:
+        return worker
+    from hil.live.held_worker import HeldWorker
+
+    return HeldWorker(worker, order.needs, order.links, lambda line: note(f"abreast {name}: {line}"))
 
 
 def _leader_options() -> list[click.Parameter]:

@@ -27,8 +27,9 @@ class Order:
     """What a daemon is started for.
 
     ``links``: the followers that it serves, if it serves any. ``out``: the recorder's log.
-    ``needs``: the daemons that emulator or leader wait for. ``natnet``: how the emulator serves its frames by
-    NatNet. ``countdown_s``: from then on to when the leader sets off; ``by_hand``: somebody else drives it.
+    ``needs``: the daemons that emulator, leader or who serves followers wait for. ``natnet``: how the
+    emulator serves its frames by NatNet. ``countdown_s``: from when all are well to when the leader sets off;
+    ``by_hand``: somebody else drives it.
     ``by_keys``: these leave orders to operators and guards.
     """
 

@@ -6,6 +6,9 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "run": (
         "abreast run --set mocap.loss=0.05 --set mocap.jitter_s=0.02",
         "abreast run --lockstep --estimator ukf --seed 7 --json",
+        """abreast run --set 'mocap.faults=[{kind="dropout", at_s=18, duration_s=1}]'""",
+        "abreast run --set "
+        """'robot.odometry_faults=[{kind="scale", at_s=18, duration_s=5, factor=0.5}]'""",
         "abreast run my_lab.toml --real --listen tcp/0.0.0.0:7447",
     ),
     "replay": (
@@ -81,6 +84,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "emulator": ("abreast emulator turtlebot3", "abreast emulator turtlebot3 --natnet"),
     "follower": (
         "abreast follower my_lab.toml --connect tcp/192.0.2.10:7447",
+        "abreast follower my_lab.toml --needs recorder",
         "abreast follower my_lab.toml --certify --secure keys",
     ),
     "estimator": ("abreast estimator my_lab.toml", "abreast estimator my_lab.toml --set estimator.kind=ukf"),

@@ -256,7 +256,9 @@ def _lockstep(scenario: Scenario, log_path: Path) -> tuple[dict[str, float], str
     duration_s = scenario.run.duration_s
     with doing(READY):
         from hil.lockstep.run import prepared, timed_lockstep
+        from hil.log.resolved_scenario import write_resolved
 
+        write_resolved(scenario, log_path.parent)
         ready = prepared(scenario)
     with Interrupt() as interrupt, progress("driving", duration_s) as tell:
 

@@ -29,6 +29,7 @@ ALIGNED_COLUMNS = (
     TableColumn("nis", "", "normalised innovation squared of the newest measurement"),
     ESTIMATE_COLUMNS["status"],
     TableColumn("reason", "", "why the status is not tracking"),
+    TableColumn("judged", "", "whether the summary's figures, as estimation.rmse, are made of this estimate"),
     TableColumn("true_rho", "m", "true rho at t"),
     TableColumn("true_alpha2", "rad", "true alpha2 at t"),
     TableColumn("true_rho_dot", "m/s", "true rho_dot at t"),

@@ -14,8 +14,9 @@ from estimation.tracking.tracker import Status
 from formation.angles import FloatArray, wrap
 from hil.exports.aligned_columns import ALIGNED_COLUMNS, SHAPE, TRUE_POSES
 from hil.exports.logged_run import DIAGONAL, LoggedRun, Refusals, Table
-from hil.judge.columns import EstimateColumns
+from hil.judge.columns import EstimateColumns, judged_rows
 from hil.judge.estimation import errors_at
+from hil.judge.sound_messages import can_be_rows
 from hil.judge.true_states import Stamps, TrueStates
 from hil.log.cdr_columns import Array, Values
 
@@ -51,6 +52,7 @@ def _columns(run: LoggedRun, estimates: Table) -> dict[str, Values]:
         **{f"sd_{name}": told.sd[:, place] for place, name in enumerate(QUANTITIES)},
         **_certified(run.certified, at_ns),
         "status": _STATUSES[told.status],
+        "judged": judged_rows(told, run.evaluation) & _can_be(estimates),
         **_true(true),
         **_errors(told, true),
         **_in_force(run.commands, at_ns),
@@ -61,10 +63,19 @@ def _columns(run: LoggedRun, estimates: Table) -> dict[str, Values]:
     }
 
 
+def _can_be(estimates: Table) -> Array:
+    """What the judge leaves out of a log is judged in no table either."""
+    return can_be_rows(estimates, _variances(estimates))
+
+
+def _variances(estimates: Table) -> FloatArray:
+    diagonal = [estimates[f"covariance.{DIAGONAL * place}"] for place in range(len(QUANTITIES))]
+    return np.column_stack(diagonal)
+
+
 def _as_judged(estimates: Table, at_ns: Stamps) -> EstimateColumns:
     numbers = {name: cast("FloatArray", values) for name, values in estimates.items()}
-    diagonal = [numbers[f"covariance.{DIAGONAL * place}"] for place in range(len(QUANTITIES))]
-    variances = np.column_stack(diagonal)
+    variances = _variances(estimates)
     seen = Perceived(*(numbers[name] for name in (*SHAPE[:-1], *_OWN)))
     return EstimateColumns(
         capture_ns=at_ns,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from estimation.tracking.tracker import Status
 from formation.records import dtype_of
 from hil.judge.columns import true_states
-from hil.judge.run_data import RunData, run_data_of_kept
+from hil.judge.run_data import RunData, Span, evaluation_span, run_data_of_kept
 from hil.judge.true_states import Stamps, TrueStates
 from hil.live.reported_number import reported_number
 from hil.log.cdr_columns import Array, Lists, columns_of, fields_of
@@ -46,10 +46,14 @@ class Refusals:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoggedRun:
-    """A follower's messages as columns in the order of their stamps. ``zero_ns``: where t_run counts from."""
+    """A follower's messages as columns in the order of their stamps.
+
+    ``zero_ns``: where t_run counts from; ``evaluation``: the span that the judge looks at.
+    """
 
     follower: str
     zero_ns: int
+    evaluation: Span
     estimates: Table
     commands: Table
     certified: Table
@@ -85,6 +89,7 @@ def recorded_run(log: Log, link: Link) -> LoggedRun:
     return LoggedRun(
         link.follower,
         run_data.zero_ns,
+        evaluation_span(run_data),
         estimates,
         tables[names.command],
         tables[names.certified],
@@ -98,6 +103,7 @@ def replayed_run(run_data: RunData) -> LoggedRun:
     return LoggedRun(
         run_data.scenario.follower.name,
         run_data.zero_ns,
+        evaluation_span(run_data),
         _sound_estimates(_table_of(msg.LeaderEstimate, run_data.estimates)),
         _table_of(msg.Command, run_data.commands),
         _table_of(msg.CertifiedEstimate, run_data.certified),

@@ -11,9 +11,8 @@ from hil.figures.plot_data import outside, with_gaps
 BELIEVED, LIMIT = "#2a8f4c", "#b03030"
 
 
-def draw_bounds(axes: Axes, t: FloatArray, low: FloatArray, high: FloatArray, suffix: str) -> None:
-    """Draw both sides of a bound."""
-    label = "extended bound" if suffix else "bound"
+def draw_bounds(axes: Axes, t: FloatArray, low: FloatArray, high: FloatArray, label: str) -> None:
+    """Draw both sides of a bound, which goes by that name in the legend."""
     for index, side in enumerate((low, high)):
         axes.plot(*with_gaps(t, side), color=LIMIT, lw=0.9, alpha=0.8, label=label if index == 0 else None)
 

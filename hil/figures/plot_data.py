@@ -21,6 +21,11 @@ from hil.judge.run_data import RunData
 from hil.judge.side_orders import desired_bearings
 from hil.judge.true_states import Stamps, TrueStates
 
+BOUNDED = ("v1", "alpha1", "h")
+"""Whose errors have bounds, in the order of those that estimates carry."""
+
+PUBLISHED, SEEN = "published bound", "bound by the largest errors seen"
+
 LONGEST_LINE = 0.5
 """Between samples that are further apart [s] no line is drawn."""
 
@@ -29,9 +34,10 @@ LONGEST_LINE = 0.5
 class PlotData:
     """What is drawn. ``tracked``: estimates of the whole run that say TRACKING, and their truth.
 
-    ``worst``: what the bounds rest on, None without judged samples; ``bounds``, ``errors``: the named bounds
-    at the judged samples, and the sizes of the errors of v1, alpha1 and h there; ``orbit``: the
-    noise-free run, where it is known; ``certified``: estimates with guaranteed radii, where there are any.
+    ``worst``: the largest errors seen, None without judged samples; ``bounds``: the bounds of v1, alpha1 and
+    h at the judged samples, in the ``bound_words`` of what they rest on; ``errors``: the sizes of the errors
+    of these there; ``orbit``: the noise-free run, where it is known; ``certified``: estimates with guaranteed
+    radii, where there are any.
     """
 
     run_data: RunData
@@ -40,6 +46,7 @@ class PlotData:
     tracked_true: TrueStates
     worst: WorstErrors | None
     bounds: Mapping[str, FloatArray]
+    bound_words: str
     errors: Mapping[str, FloatArray]
     orbit: NoiseFreeOrbit | None
     certified: CertifiedColumns
@@ -53,14 +60,15 @@ class PlotData:
         tracked = columns.estimates.only((columns.estimates.status == Status.TRACKING) & during)
         worst: WorstErrors | None = None
         bounds: Mapping[str, FloatArray] = {}
+        words = PUBLISHED
         errors: Mapping[str, FloatArray] = {}
         if len(columns.samples.capture_ns):
             worst = worst_errors(run_data.scenario, columns)
-            bounds = named_bounds(run_data.scenario, columns, worst)
+            bounds, words = _drawn_bounds(run_data, columns, worst)
             errors = bound_errors(run_data.scenario, columns)
         true = columns.truth.at(tracked.capture_ns)
         certified = CertifiedColumns.of(run_data.certified, columns.span)
-        return PlotData(run_data, columns, tracked, true, worst, bounds, errors, orbit, certified)
+        return PlotData(run_data, columns, tracked, true, worst, bounds, words, errors, orbit, certified)
 
     @property
     def truth_name(self) -> str:
@@ -79,10 +87,20 @@ class PlotData:
         rho = np.full(len(corners), scenario.formation.rho_0)
         return self.seconds(corners), (rho, *desired_bearings(scenario, orders, corners))
 
-    @property
-    def drawn_bound(self) -> str:
-        """Suffix of the bounds that are drawn: the sound ones where true rates are known, else extended."""
-        return "" if np.any(np.isfinite(self.columns.true.rho_dot)) else "_extended"
+
+def _drawn_bounds(
+    run_data: RunData, columns: Columns, worst: WorstErrors
+) -> tuple[Mapping[str, FloatArray], str]:
+    """Bounds of v1, alpha1 and h at the judged samples, and in words what they rest on.
+
+    Those that the estimates went out with, as the verdict has them; where these are not known, the extended
+    ones by the largest errors seen.
+    """
+    published = columns.samples.bounds
+    if published is not None and not np.all(np.isnan(published)):
+        return dict(zip(BOUNDED, published.T, strict=True)), PUBLISHED
+    named = named_bounds(run_data.scenario, columns, worst)
+    return {name: named[f"{name}_extended"] for name in BOUNDED}, SEEN
 
 
 def outside(error: FloatArray, bound: FloatArray) -> NDArray[np.bool_]:

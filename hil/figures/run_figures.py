@@ -179,7 +179,11 @@ def _findings(summary: Mapping[str, Any]) -> list[str]:
     if "rho_min" in formation:
         found.append(rf"$\rho$ in [{formation['rho_min']:.3f}, {formation['rho_max']:.3f}] m")
     bounds = summary["bounds"]
-    if "violations" in bounds:
+    published = bounds.get("published", {})
+    if "violations" in published:
+        broken = sum(published["violations"].values())
+        found.append(f"published bounds broken in {broken} of {published['checked']}")
+    elif "violations" in bounds:
         broken = max(count for name, count in bounds["violations"].items() if name.endswith("_extended"))
         found.append(f"extended bounds broken in {broken} of {bounds['checked']}")
     latency = summary.get("latency_ms", {}).get("capture_to_command")

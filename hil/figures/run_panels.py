@@ -66,9 +66,9 @@ def draw_v1(axes: Axes, data: PlotData) -> None:
     reach = max(data.run_data.scenario.leader.k_v, float(np.median(v1)))
     judged = data.seconds(columns.samples.capture_ns)
     if "v1" in data.bounds:
-        bound, centre = data.bounds["v1" + data.drawn_bound], np.asarray(columns.samples.seen.v1)
+        bound, centre = data.bounds["v1"], np.asarray(columns.samples.seen.v1)
         if np.min(bound) < reach:
-            draw_bounds(axes, judged, centre - bound, centre + bound, data.drawn_bound)
+            draw_bounds(axes, judged, centre - bound, centre + bound, data.bound_words)
         mark_violations(axes, judged, centre, np.abs(centre - columns.true.v1), bound)
     limit_to(axes, 0.0, 1.8 * reach)
     axes.set_ylabel("$v_1$ [m/s]")
@@ -84,13 +84,13 @@ def draw_alpha1_error(axes: Axes, data: PlotData) -> None:
     reach = 4.0 * float(np.median(sd))
     judged = data.seconds(columns.samples.capture_ns)
     if "alpha1" in data.bounds:
-        bound = _DEGREES * data.bounds["alpha1" + data.drawn_bound]
+        bound = _DEGREES * data.bounds["alpha1"]
         at_samples = _DEGREES * wrap(np.asarray(columns.samples.seen.alpha1) - columns.true.alpha1)
         largest = float(np.max(np.abs(at_samples), where=np.isfinite(at_samples), initial=0.0))
         reach = max(reach, 1.5 * largest)
         if np.max(bound) < _FARTHEST * reach:
             reach = max(reach, 1.15 * float(np.max(bound)))
-            draw_bounds(axes, judged, -bound, bound, data.drawn_bound)
+            draw_bounds(axes, judged, -bound, bound, data.bound_words)
         mark_violations(axes, judged, at_samples, np.abs(at_samples) / _DEGREES, bound / _DEGREES)
     axes.set_ylim(-min(reach, 180.0), min(reach, 180.0))
     axes.set_ylabel(r"$\hat\alpha_1 - \alpha_1$ [deg]")

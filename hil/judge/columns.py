@@ -208,11 +208,10 @@ class Columns:
 
 
 def columns_of(run_data: RunData) -> Columns:
-    """Columns of run data. Samples are the estimates marked TRACKING whose capture lies in the evaluation."""
+    """Columns of run data. Samples are the estimates of :func:`judged_rows`."""
     run, span = run_span(run_data), evaluation_span(run_data)
     estimates, truth = estimate_columns(run_data), true_states(run_data)
-    judged = inside(estimates.capture_ns, span)
-    samples = estimates.only(judged & (estimates.status == Status.TRACKING))
+    samples = estimates.only(judged_rows(estimates, span))
     return Columns(
         run=run,
         span=span,
@@ -222,6 +221,12 @@ def columns_of(run_data: RunData) -> Columns:
         samples=samples,
         true=truth.at(samples.capture_ns),
     )
+
+
+def judged_rows(estimates: EstimateColumns, span: Span) -> NDArray[np.bool_]:
+    """Which estimates are judged: those marked TRACKING whose capture lies in the evaluation."""
+    tracking: NDArray[np.bool_] = estimates.status == Status.TRACKING
+    return inside(estimates.capture_ns, span) & tracking
 
 
 def estimate_columns(run_data: RunData) -> EstimateColumns:

@@ -13,6 +13,7 @@ from hil import __version__
 from hil.errors import UsageError
 from hil.judge.certified import certified_violations
 from hil.judge.findings import found_again
+from hil.judge.late_recorder import late_recorder
 from hil.judge.run_data import (
     RunData,
     captured,
@@ -167,7 +168,10 @@ def why_not_same(log: Log, played: Played) -> str:
     if gap_s > _LONG_GAP_S:
         # Whatever was consumed in the meantime, its receipts went by too.
         lost = lost or f"the log has nothing of {gap_s:.1f} s before: nobody can repeat what it misses"
-    reasons = [reason for reason in (lost, _cut_in_front(log), _other_version(log)) if reason]
+    cut = _cut_in_front(log)
+    begins = not cut and any(parity.first == 0 for parity in played.parity.values())
+    late = late_recorder(log, played.link) if begins else ""
+    reasons = [reason for reason in (late or lost, cut, _other_version(log)) if reason]
     question = "did every daemon run with the recorder's scenario, and with this version of abreast?"
     return f"log {log.path}: {', '.join(wrong)}; {'; '.join(reasons) or question}"
 

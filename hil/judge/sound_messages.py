@@ -8,6 +8,7 @@ from operator import attrgetter
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.tracking.estimate import QUANTITIES
 from estimation.tracking.tracker import Status
@@ -42,6 +43,16 @@ def _can_be(estimate: LeaderEstimate) -> bool:
     if not all(-_LARGEST < number < _LARGEST for number in _NUMBERS(estimate)):
         return False
     return not (np.abs(estimate.covariance) >= _LARGEST).any()
+
+
+def can_be_rows(
+    numbers: Mapping[str, NDArray[np.float64]], variances: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Of which estimates, as columns by the fields' names with their variances (n, 5), numbers are sound."""
+    told = np.column_stack([numbers[name] for name in (*QUANTITIES, "rho", "alpha2", "v2", "u2")])
+    return np.asarray(
+        np.all(np.abs(told) < _LARGEST, axis=1) & ~np.any(np.abs(variances) >= _LARGEST, axis=1)
+    )
 
 
 def _stamps(message: Message) -> Iterator[Time]:

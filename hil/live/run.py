@@ -12,19 +12,17 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from hil.errors import UsageError
 from hil.guard.report import GUARDS
 from hil.live.child_processes import Children
 from hil.live.crew import Crew, processes_of
 from hil.live.daemon import Ending
 from hil.live.disk_watch import refuse_full_disk
 from hil.live.run_monitor import RunMonitor, Snapshot
-from hil.log.written_aside import write_text_aside
+from hil.log.resolved_scenario import write_resolved
 from hil.nodes.findings import named_findings
 from hil.nodes.link_nodes import leader_standstill, standstill
 from hil.nodes.node import diagnostics
 from hil.nodes.stopping import SUPERVISOR, stop_finding
-from hil.scenario.files import scenario_text
 from hil.scenario.links import HOSTED, links_of, node_names
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
@@ -84,13 +82,7 @@ def run_live(
     """
     folder = log_path.parent
     refuse_full_disk(folder)
-    resolved = folder / "scenario.toml"
-    try:
-        write_text_aside(resolved, scenario_text(scenario))
-    except OSError as error:
-        raise UsageError(
-            f"--out {folder}: cannot be written ({error.strerror}); give another folder"
-        ) from None
+    resolved = write_resolved(scenario, folder)
     with ExitStack() as held:
         if endpoints.listen:
             held.callback(close_session, open_session(endpoints))

@@ -29,7 +29,10 @@ ADVICE = {
     "frames_of_reference": "have both bodies sent in one frame of reference",
     "bodies": "give the bodies the names that leader.body and follower.body say",
     "noise": "set the sigmas to what abreast calibrate prints: bounds and certificates rest on what is told",
-    "nees": "deviations are not what errors are: set the sigmas and the leader's limits to what is true",
+    "nees": (
+        "deviations are not what errors are: set the sigmas and the leader's limits to what is true; wrong "
+        'odometry shows so as well, which estimator.own_motion = "auto" judges'
+    ),
     "cusp": "the leader stood or turned back: give the estimator a moment of travel before relying on alpha1",
     "second_sender": "end all but one of those who send on this topic",
     "guard_latched": "see what it says; abreast arm lets the robot be driven again",
@@ -43,6 +46,10 @@ ADVICE = {
 }
 """What to do, by the name of what was found."""
 
+_BY_ODOMETRY = (
+    "{} was found as well, and deviations rest on odometry: mend that first, and the sigmas or the leader's "
+    "limits only if this is left"
+)
 _OTHERWISE = "look at what says so in the diagnostics"
 
 
@@ -79,7 +86,18 @@ def all_found(reports: Iterable[Mapping[str, Findings]]) -> dict[str, dict[str, 
 
 def findings_json(findings: Findings) -> list[dict[str, Any]]:
     """Findings as results have them, each with what to do about it."""
-    return [{"name": name, "text": text, "advice": advice_on(name)} for name, text in findings.items()]
+    return [
+        {"name": name, "text": text, "advice": _advice_beside(name, findings)}
+        for name, text in findings.items()
+    ]
+
+
+def _advice_beside(name: str, others: Iterable[str]) -> str:
+    """What to do about a finding where others were found, of which one may be the cause of it."""
+    wrong = [other for other in others if other.startswith("odometry_")]
+    if name == "nees" and wrong:
+        return _BY_ODOMETRY.format(" and ".join(wrong))
+    return advice_on(name)
 
 
 def finding_line(finding: Mapping[str, str]) -> str:

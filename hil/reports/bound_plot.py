@@ -15,11 +15,11 @@ _COLOURS = {"v1": BELIEVED, "alpha1": PURPLE, "h": TRUE}
 
 
 def tightness_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
-    """Every error as a share of its extended bound [%]; None where no error is known."""
+    """Every error as a share of the bound that is drawn elsewhere [%]; None where no error is known."""
     t = data.seconds(data.columns.samples.capture_ns)
     used = {}
     for name, error in data.errors.items():
-        bound = data.bounds[f"{name}_extended"]
+        bound = data.bounds[name]
         share = np.divide(error, bound, out=np.full(len(t), math.nan), where=bound > 0.0)
         if np.any(np.isfinite(share)):
             used[name] = 100.0 * share
@@ -32,5 +32,5 @@ def tightness_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
         line = draw_line(plot, table(t, share, {"y": share}), "y", _COLOURS[name], width=1.0)
         hover(plot, line, {f"{_LABELS[name]} at": "@t{0.00} s", "used up": "@y{0.0} %"})
     keys = [Key(_LABELS[name], _COLOURS[name]) for name in used]
-    says = "Errors as a share of their extended bounds; above 100 % a bound is violated."
-    return Panel("Bounds used up", says, (*keys, Key("bound", BOUND, "dashed")), plot)
+    says = f"Errors, each as a share of its {data.bound_words}; above 100 % that is violated."
+    return Panel("Bounds used up", says, (*keys, Key(data.bound_words, BOUND, "dashed")), plot)

@@ -113,7 +113,7 @@ def _course(
         sides = table(at, bound, {"low": centre - bound, "high": centre + bound})
         for side in ("low", "high"):
             draw_line(plot, sides, side, BOUND, width=1.0)
-        keys.append(Key("assumed bound", BOUND))
+        keys.append(Key(_bound_words(data, quantity, "assumed bound"), BOUND))
         says += f"; its error is bounded by {_range(bound, quantity.unit)} if the scenario's noise holds"
     if judged and largest_radius(data, quantity.name, scale) is not None:
         keys.append(draw_certified(plot, data, quantity.name, scale, of_error=False))
@@ -134,9 +134,10 @@ def _error(
     keys = [Key("error", BELIEVED), Key("3 σ", BELIEVED, "band")]
     says = f"Error of {quantity.symbol}: estimate minus truth."
     bound = _bound(data, quantity.name, scale)
-    drawn = bound is not None and float(np.min(bound)) < _FARTHEST * height
-    if bound is not None and drawn:
-        height = max(height, min(1.1 * float(np.max(bound)), _FARTHEST * height))
+    limited = None if bound is None else bound[np.isfinite(bound)]
+    drawn = limited is not None and len(limited) > 0 and float(np.min(limited)) < _FARTHEST * height
+    if limited is not None and drawn:
+        height = max(height, min(1.1 * float(np.max(limited)), _FARTHEST * height))
     radius = largest_radius(data, quantity.name, scale)
     certified = radius is not None and radius < _FARTHEST * height
     if radius is not None:
@@ -156,9 +157,7 @@ def _error(
     if certified:
         keys.append(draw_certified(plot, data, quantity.name, scale, of_error=True))
     if bound is not None:
-        label = (
-            f"largest judged error {SYMBOLS[_RATES[quantity.name]]}" if quantity.name in _RATES else "bound"
-        )
+        label = _bound_words(data, quantity, "largest judged error")
         says += f" {label[0].upper()}{label[1:]}: {_range(bound, unit)}"
         says += "." if drawn else ", outside the picture."
         if drawn:
@@ -183,12 +182,17 @@ def _judged(data: PlotData) -> FloatArray:
     return data.seconds(data.columns.samples.capture_ns)
 
 
+def _bound_words(data: PlotData, quantity: _Quantity, of_rate: str) -> str:
+    """What the bound of :func:`_bound` is called; ``of_rate``: what that of a rate is."""
+    return f"{of_rate} {SYMBOLS[_RATES[quantity.name]]}" if quantity.name in _RATES else data.bound_words
+
+
 def _bound(data: PlotData, name: str, scale: float) -> FloatArray | None:
-    """Scaled bound of a quantity's error at every judged sample; of rates what the other bounds rest on."""
+    """Scaled bound of a quantity's error at every judged sample; of rates the largest error seen."""
     if name in _RATES and data.worst is not None:
         rate = np.asarray(getattr(data.worst.rates, _RATES[name]), dtype=np.float64)
         return np.broadcast_to(scale * rate, (len(data.columns.samples.capture_ns),))
-    bound = data.bounds.get(name + data.drawn_bound)
+    bound = data.bounds.get(name)
     return None if bound is None else scale * bound
 
 
@@ -204,8 +208,9 @@ def _limits(data: PlotData, quantity: _Quantity, value: FloatArray, true: FloatA
 
 
 def _range(bound: FloatArray, unit: str) -> str:
-    low, high = float(np.min(bound)), float(np.max(bound))
-    return f"{low:.3g} {unit}" if f"{low:.3g}" == f"{high:.3g}" else f"{low:.3g} to {high:.3g} {unit}"
+    """The median, as the verdict tells it, and from where to where a bound goes."""
+    low, middle, high = (f"{float(each):.3g}" for each in (np.min(bound), np.median(bound), np.max(bound)))
+    return f"{low} {unit}" if low == high else f"{middle} {unit} (median; {low} to {high})"
 
 
 def _mark(plot: Figure, t: FloatArray, error: FloatArray, height: float) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -16,6 +17,8 @@ GOOD, WARN, BAD, PLAIN = "good", "warn", "bad", "soft"
 _SIGNS = {GOOD: ("✓", "good: "), WARN: ("!", "look again: "), BAD: ("✗", "bad: "), PLAIN: ("·", "")}
 _FAR = 0.5
 """Who is further off his station than this share of the least distance is not in formation, noise or not."""
+_SHORT = 60
+"""A warning of so many letters is told in full."""
 PLACES = {
     "spells": "bad-spells",
     "bounds": "bounds",
@@ -56,11 +59,19 @@ def reasons_of(summary: Mapping[str, Any]) -> list[Reason]:
     for part, reason in told.items():
         if reason is None and not warned.get(part):
             continue
-        reason = reason or Reason(part, WARN, "look again")
-        if warned.get(part) and reason.style != BAD:
-            reason = Reason(part, WARN, reason.text)
-        reasons.append(reason)
+        reasons.append(_doubted(part, reason, warned.get(part, ())))
     return reasons
+
+
+def _doubted(part: str, reason: Reason | None, warnings: Sequence[str]) -> Reason:
+    """A reason with what makes one look again, where its own text does not say so."""
+    brief = "; ".join(map(_brief, warnings))
+    if reason is None:
+        return Reason(part, WARN, brief)
+    if not warnings or reason.style == BAD:
+        return reason
+    says = reason.style == WARN
+    return Reason(part, WARN, reason.text if says else f"{reason.text}; {brief}")
 
 
 def verdict_html(summary: Mapping[str, Any]) -> str:
@@ -222,6 +233,11 @@ def _replay(summary: Mapping[str, Any]) -> Reason | None:
     for _, text, style in found:
         return Reason("replay", GOOD if style == "green" else BAD, text)
     return None
+
+
+def _brief(warning: str) -> str:
+    """A warning without what it adds in brackets or after a colon, if it is long."""
+    return warning if len(warning) <= _SHORT else re.split(r" \(|[:;] ", warning, maxsplit=1)[0]
 
 
 def _times(count: int) -> str:

@@ -10,11 +10,13 @@ import tomllib
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, TypeGuard, TypeVar, get_args, get_origin
+from typing import Any, TypeVar, get_args
 
 import msgspec
 
 from hil.errors import UsageError
+from hil.scenario.kinds_of_key import is_section, literals
+from hil.scenario.table_examples import example_of, kind_meant
 
 T = TypeVar("T", bound=msgspec.Struct)
 
@@ -124,7 +126,8 @@ def _explain(error: str, tree: Mapping[str, Any], kind: type[msgspec.Struct]) ->
         section = unknown["path"] or ""
         known = _known_keys(section, tree, kind)
         where = f"[{section}] has an" if section else "there is an"
-        return f"{where} unknown key {unknown['key']!r}; {nearest(unknown['key'], known)}"
+        hint = kind_meant(unknown["key"], kind) or nearest(unknown["key"], known)
+        return f"{where} unknown key {unknown['key']!r}; {hint}"
     parts = _AT.match(error)
     if parts is None:
         return error
@@ -138,8 +141,19 @@ def _explain(error: str, tree: Mapping[str, Any], kind: type[msgspec.Struct]) ->
     if allowed:
         near = meant(value, map(str, allowed)) if isinstance(value, str) else ""
         what = f"expected one of {', '.join(map(repr, allowed))}{near}"
+    what = _with_example(what, path, tree, kind)
     shown = f" is {value!r}:" if path and not isinstance(value, Mapping) and value is not None else ":"
     return f"{path or 'top level'}{shown} {what}"
+
+
+def _with_example(what: str, path: str, tree: Mapping[str, Any], kind: type[msgspec.Struct]) -> str:
+    """What is wrong at a path, with an example where a list of tables is to be."""
+    _, tables = _walk(path, tree, kind)
+    examples = filter(None, (example_of(path.partition("[")[0], each) for each in tables))
+    example = next(examples, "")
+    return (
+        f"{what.replace('expected array', 'expected a list of tables')}; as in {example}" if example else what
+    )
 
 
 def _known_keys(section: str, tree: Mapping[str, Any], kind: type[msgspec.Struct]) -> list[str]:
@@ -181,15 +195,3 @@ def _below(node: object, step: str) -> Any:
         in_list = isinstance(value, Sequence) and place.isdecimal() and int(place) < len(value)
         value = value[int(place)] if in_list and isinstance(value, Sequence) else None
     return value
-
-
-def is_section(kind: object) -> TypeGuard[type[msgspec.Struct]]:
-    """Whether a type is that of a section."""
-    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
-
-
-def literals(kind: Any) -> list[object]:
-    """Values of a Literal, or of the Literals in a union."""
-    if get_origin(kind) is Literal:
-        return list(get_args(kind))
-    return [value for option in get_args(kind) for value in literals(option)]

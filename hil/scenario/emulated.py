@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta
 
@@ -35,6 +36,8 @@ class OdometryFaultSection(Section, frozen=True, kw_only=True):
     ``factor`` |u2| (u2 in rad/s, at most 0.9) of what the wheels turn is lost; ``reset``: the pose begins
     anew at its origin, once. ``duration_s`` 0 stands for good.
     """
+
+    EXAMPLE: ClassVar[Mapping[str, Any]] = {"kind": "scale", "at_s": 18, "duration_s": 5, "factor": 0.5}
 
     kind: Literal["silent", "nan", "zero", "reversed", "scale", "delay", "slip", "reset", "commands"]
     at_s: Moment
@@ -75,6 +78,8 @@ class FaultSection(Section, frozen=True, kw_only=True):
     under the other's name; ``freeze``: a body's last pose again and again; ``dropout``: no frames.
     ``duration_s`` 0 stands for one frame.
     """
+
+    EXAMPLE: ClassVar[Mapping[str, Any]] = {"kind": "dropout", "at_s": 18, "duration_s": 1}
 
     kind: Literal["step", "turn", "swap", "freeze", "dropout"]
     at_s: Moment

@@ -7,7 +7,7 @@ from typing import get_args, get_origin
 
 import msgspec
 
-from hil.scenario.checked_toml import is_section, literals
+from hil.scenario.kinds_of_key import is_section, literals
 from hil.scenario.schema import ESTIMATOR_NAMES, LAW_NAMES, Scenario
 
 _OF_NAMES = {"estimator.kind": ESTIMATOR_NAMES, "controller.law": LAW_NAMES}

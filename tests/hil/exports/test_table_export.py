@@ -20,6 +20,7 @@ from hil.judge.columns import columns_of
 from hil.judge.estimation import errors_at
 from hil.judge.replayed import ReplayChoice
 from hil.judge.run_data import run_data_of_log
+from hil.judge.summary import summarise
 from hil.lockstep.run import run_lockstep
 from hil.log.opened import opened_log
 from hil.log.reader import Log, read_log
@@ -27,7 +28,7 @@ from hil.log.writer import LogWriter
 from hil.replay.estimate_csv import write_estimates
 from hil.scenario.files import load_scenario
 from hil.wire.message_types import Command, LeaderEstimate
-from hil.wire.messages import to_ns
+from hil.wire.messages import encode, to_ns
 
 RECORDED = ReplayChoice(in_messages=True)
 
@@ -63,6 +64,36 @@ def test_errors_and_truth_are_those_of_the_judge(folder: Path, short_log: Log) -
     rebuilt = table["true_alpha1"] + table["error_alpha1"] - table["alpha1"]
     assert np.allclose(np.cos(rebuilt.drop_nans().to_numpy()), 1.0)
     assert table.filter(pl.col("status") == "tracking")["error_v1"].abs().max() < 0.05  # type: ignore[operator]
+
+
+def test_judged_rows_have_the_rmse_of_the_summary(folder: Path, short_log: Log) -> None:
+    table = pd.read_parquet(folder / "aligned.parquet")
+    told = summarise(run_data_of_log(short_log))["estimation"]
+    assert table.judged.dtype == bool
+    assert table.judged.sum() == told["samples"] < (table.status == "tracking").sum()
+    judged = table[table.judged]
+    for name in ("v1", "alpha1"):
+        error = judged[f"error_{name}"]
+        assert (error**2).mean() ** 0.5 == pytest.approx(told["rmse"][name], rel=1e-12)
+        assert error.abs().max() == pytest.approx(told["max"][name], rel=1e-12)
+
+
+def test_what_the_judge_leaves_out_of_a_log_is_not_judged(short_log: Log, tmp_path: Path) -> None:
+    with LogWriter(tmp_path / "odd.mcap", short_log.metadata) as writer:
+        for record in short_log.records():
+            payload = record.payload
+            if record.topic == "follower/leader_estimate":
+                told = short_log.decode(record)
+                assert isinstance(told, LeaderEstimate)
+                odd = told.header.stamp.nanosec % 7 == 0
+                payload = encode(dataclasses.replace(told, v1=math.inf)) if odd else payload
+            writer.write(record.topic, record.typename, payload, record.log_ns, record.publish_ns)
+    log = read_log(tmp_path / "odd.mcap")
+    export_tables(log, tmp_path / "out", "parquet", RECORDED)
+    table = pd.read_parquet(tmp_path / "out/aligned.parquet")
+    assert np.isinf(table.v1).any()
+    assert not table.judged[np.isinf(table.v1)].any()
+    assert table.judged.sum() == summarise(run_data_of_log(log))["estimation"]["samples"]
 
 
 def test_the_command_in_force_is_the_last_one_issued_by_then(folder: Path, short_log: Log) -> None:

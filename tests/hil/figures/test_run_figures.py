@@ -98,13 +98,17 @@ def marks(axes: Axes) -> list[int]:
 
 
 def test_violations_are_marked(axes: Axes, exact_run_data: RunData) -> None:
-    estimates = list(exact_run_data.estimates)
+    estimates = [
+        replace(each, bound_v1=0.009, bound_alpha1=0.09, bound_h=math.inf)
+        for each in exact_run_data.estimates
+    ]
     for number in (100, 150, 151):
         estimates[number] = replace(
             estimates[number], v1=estimates[number].v1 + 0.01, alpha1=estimates[number].alpha1 + 0.1
         )
     run_data = replace(exact_run_data, estimates=estimates)
     draw_v1(axes, PlotData.of(run_data))
+    assert "published bound" in [str(line.get_label()) for line in axes.lines]
     assert marks(axes) == [3]
     assert "violated (3)" in [str(line.get_label()) for line in axes.lines]
     draw_alpha1_error(axes, PlotData.of(run_data))

@@ -16,6 +16,7 @@ from hil.judge.chain_summary import summarise_chain
 from hil.judge.run_data import run_data_of_link
 from hil.lockstep.run import run_lockstep
 from hil.log.events import Timed, logged_events
+from hil.log.metadata import scenario_of
 from hil.log.reader import read_log
 from hil.nodes.link_nodes import estimator_node
 from hil.replay.re_execution import execute
@@ -55,8 +56,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_chain_leaves_log_summary_picture_and_page(folder: Path) -> None:
-    left = {"run.mcap", "summary.json", "run.png", "report.html"}
+    left = {"run.mcap", "scenario.toml", "summary.json", "run.png", "report.html"}
     assert {path.name for path in folder.iterdir()} == left
+    assert load_scenario(str(folder / "scenario.toml")) == scenario_of(read_log(folder / "run.mcap"))
     summary = json.loads((folder / "summary.json").read_text())
     assert (summary["agents"], summary["mode"], summary["recovered"]) == (3, "lockstep", True)
     assert [(pair["leader"], pair["follower"]) for pair in summary["pairs"]] == [

@@ -34,6 +34,15 @@ def test_all_that_was_ever_found_is_kept_in_its_last_words() -> None:
     assert all_found(reports) == {"a": later, "b": {"clock": "behind"}}
 
 
+def test_deviations_that_wrong_odometry_explains_are_not_blamed_on_the_sigmas() -> None:
+    (alone,) = findings_json({"nees": "too confident"})
+    assert "set the sigmas" in alone["advice"]
+    assert 'odometry shows so as well, which estimator.own_motion = "auto" judges' in alone["advice"]
+    _, beside = findings_json({"odometry_contradicts": "scaled by 0.53", "nees": "too confident"})
+    assert beside["advice"].startswith("odometry_contradicts was found as well")
+    assert "mend that first" in beside["advice"]
+
+
 def test_every_finding_has_an_advice_in_one_line() -> None:
     (found,) = findings_json(SILENT)
     assert found == {"name": "odometry_silent", "text": SILENT["odometry_silent"], "advice": found["advice"]}

@@ -49,6 +49,20 @@ def test_what_speaks_against_a_run_is_in_the_sentence_and_at_its_place(
     assert warnings_html(summary, judged)
 
 
+def test_what_to_look_at_again_is_said_in_few_words(summary: dict[str, Any]) -> None:
+    summary["bounds"]["input_errors_hold"] = {"E_v2": 0.8, "all": 0.64}
+    summary["frames"] = summary["frames"] | {"lost": 24, "published": 240}
+    told = {reason.part: reason.text for reason in reasons_of(summary) if reason.style == "warn"}
+    assert set(told) == {"bounds", "latency"}
+    assert "held in all" in told["bounds"]
+    assert told["bounds"].endswith(
+        "; inputs err as little as the scenario assumes in 64% of the samples only"
+    )
+    summary["rejected"] = {"follower_outlier": 8, "gated": 5}
+    assert reasons_of(summary)[4].text.endswith("; inputs refused: follower outlier 8, gated 5")
+    assert told["latency"].endswith("; 10.0% of the frames never reached the estimator")
+
+
 def test_a_pair_far_off_its_station_is_looked_at_again(summary: dict[str, Any]) -> None:
     summary["formation"]["equilibrium_deviation_rms"]["rho"] = 3.0
     assert styles(summary)["formation"] == "warn"

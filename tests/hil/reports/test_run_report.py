@@ -22,6 +22,7 @@ from estimation.tracking.tracker import Status
 from hil.figures.plot_data import PlotData
 from hil.judge.run_data import RunData, run_data_of_log
 from hil.judge.summary import summarise
+from hil.judge.summary_text import verdict_lines
 from hil.log.reader import Log
 from hil.nodes.findings import advice_on
 from hil.reports.colours import DARK, DARKENED
@@ -213,7 +214,11 @@ def test_certified_radii_are_drawn_with_the_estimates(exact_run_data: RunData) -
 @pytest.fixture(scope="module")
 def eventful(exact_run_data: RunData) -> str:
     """Report of a run with three samples outside their bounds, stops, estimates lost, and hostile texts."""
-    estimates, commands = list(exact_run_data.estimates), list(exact_run_data.commands)
+    estimates = [
+        replace(each, bound_v1=0.009, bound_alpha1=0.09, bound_h=math.inf)
+        for each in exact_run_data.estimates
+    ]
+    commands = list(exact_run_data.commands)
     for number in (100, 150, 151):
         estimates[number] = replace(
             estimates[number], v1=estimates[number].v1 + 0.01, alpha1=estimates[number].alpha1 + 0.1
@@ -232,8 +237,8 @@ def eventful(exact_run_data: RunData) -> str:
 
 def test_the_head_says_what_was_run_and_how_it_went(eventful: str) -> None:
     assert f"{EVIL} · ekf · seed 1 · lockstep" in words(eventful)
-    assert "Bounds: extended ones violated" in words(eventful)
-    assert "✗ bad: bounds extended ones violated" in words(eventful)
+    assert "Bounds: published ones violated 6 times, extended ones" in words(eventful)
+    assert "✗ bad: bounds published ones violated 6 times, extended ones" in words(eventful)
     assert 'class="verdict bad"' in eventful
     assert "inputs refused: gated 1, swapped 2" in words(eventful)
 
@@ -242,6 +247,28 @@ def test_violations_are_told_and_marked(eventful: str) -> None:
     assert words(eventful).count("violated (3)") == 2
     assert words(eventful).count("Violated in 3 of ") == 2
     assert eventful.count('"marker":{"type":"value","value":"x"}') == 2
+
+
+def test_bounds_in_pictures_are_those_of_the_verdict(short_log: Log) -> None:
+    run_data = run_data_of_log(short_log)
+    summary = summarise(run_data)
+    said = words(run_report(PlotData.of(run_data), summary))
+    median = summary["bounds"]["published"]["median"]
+    assert f"Published bound: {1e3 * median['v1']:.3g} mm/s (median;" in said
+    assert f"Published bound: {math.degrees(median['alpha1']):.3g} deg (median;" in said
+    (told,) = (text for name, text, _ in verdict_lines(summary) if name == "bounds")
+    assert f"v1 within {1e3 * median['v1']:.1f} mm/s" in told
+
+
+def test_where_no_bounds_were_published_those_in_pictures_say_what_they_rest_on(
+    exact_run_data: RunData,
+) -> None:
+    estimates = [
+        replace(each, bound_v1=NAN, bound_alpha1=NAN, bound_h=NAN) for each in exact_run_data.estimates
+    ]
+    said = words(report(replace(exact_run_data, estimates=estimates)))
+    assert "Bound by the largest errors seen: " in said
+    assert "ublished bound: " not in said
 
 
 def test_stops_and_statuses_are_told(eventful: str) -> None:

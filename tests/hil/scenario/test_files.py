@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import re
 import tomllib
 from pathlib import Path
 
@@ -21,6 +22,8 @@ from hil.scenario.files import (
 from hil.scenario.schema import ConstantProgram, Scenario
 
 TABLE = "leader.program={kind='table', t=[0.0, 1.0], v=[0.1, 'fast'], u=[0, 0]}"
+DROPOUT = re.escape("""--set 'mocap.faults=[{kind="dropout", at_s=18, duration_s=1}]'""")
+SLIP = re.escape("""--set 'robot.odometry_faults=[{kind="slip", at_s=18, duration_s=5}]'""")
 
 
 @pytest.mark.parametrize(
@@ -53,6 +56,20 @@ TABLE = "leader.program={kind='table', t=[0.0, 1.0], v=[0.1, 'fast'], u=[0, 0]}"
         ("=0.1", r"--set '=0\.1': expected section\.key=value"),
         ("mocap..loss=0.1", r"expected section\.key=value"),
         ("leader.pose.x=1", r"'pose' is a value and has no keys below it"),
+        (
+            "mocap.faults=dropout",
+            rf"mocap\.faults is 'dropout': expected a list of tables, .* as in {DROPOUT}",
+        ),
+        ("mocap.faults.kind=dropout", rf"mocap\.faults: expected a list of tables, .* as in {DROPOUT}"),
+        ("mocap.faults=['dropout']", rf"faults\[0\] is 'dropout': expected a section, .* as in {DROPOUT}"),
+        ("mocap.faults=[{kind='freeze'}]", r"faults\[0\]: missing required field at_s; as in --set 'mocap"),
+        ("mocap.dropout=2", rf"key 'dropout'; 'dropout' is a kind of mocap\.faults: give {DROPOUT}"),
+        ("mocap.dropouts=2", rf"key 'dropouts'; 'dropout' is a kind of mocap\.faults: give {DROPOUT}"),
+        ("robot.slip=1", rf"'slip' is a kind of robot\.odometry_faults: give {SLIP}"),
+        (
+            "robot.odometry_faults=3",
+            r"robot\.odometry_faults is 3: expected a list of tables, got int; as in",
+        ),
         ("a." * 4000 + "b=1", r"nested too deeply"),
     ],
 )
@@ -61,6 +78,15 @@ def test_a_mistake_is_answered_by_one_line_that_helps(override: str, message: st
         load_scenario("turtlebot3", [override])
     assert "\n" not in str(caught.value)
     assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    "override", [re.sub(r"\\(.)", r"\1", each).removeprefix("--set ").strip("'") for each in (DROPOUT, SLIP)]
+)
+def test_the_examples_in_messages_are_accepted(override: str) -> None:
+    scenario = load_scenario("turtlebot3", [override])
+    moments = [each.at_s for each in scenario.mocap.faults]
+    assert [*moments, *(each.at_s for each in scenario.robot.odometry_faults)] == [18.0]
 
 
 def test_a_missing_key_is_named() -> None:
