@@ -207,6 +207,7 @@ def _run(chosen: Scenario, folder: Path, live: _Live | None, figures: Kind | Non
     if log_path.exists():
         raise UsageError(f"{log_path} exists already; give another --out, or move it away")
     failure, left, interrupted, signal_number = "", "", "", 0
+    broke = "the run broke down: "
     timing: dict[str, dict[str, float]] = {}
     if live is None:
         timing["lockstep"], interrupted, signal_number = _lockstep(chosen, named)
@@ -214,6 +215,9 @@ def _run(chosen: Scenario, folder: Path, live: _Live | None, figures: Kind | Non
         outcome = _live(chosen, named, live)
         failure, left, interrupted = outcome.failure, f"{outcome.robots}, ", _interrupted(outcome)
         signal_number = outcome.signal
+        if outcome.stopped:
+            # As somebody wanted it: no words that alarm.
+            broke = ""
         if outcome.recorded and not log_path.exists():
             gone = f"log {log_path} is not there any more: somebody moved or deleted it during the run"
             raise CheckFailedError(f"{failure}; {gone}" if failure else gone)
@@ -232,7 +236,7 @@ def _run(chosen: Scenario, folder: Path, live: _Live | None, figures: Kind | Non
     finally:
         # Also if there is no room for a verdict, say: what went wrong first is what to tell.
         if failure:
-            raise CheckFailedError(f"the run broke down: {failure}; {left}the log is {log_path}")
+            raise CheckFailedError(f"{broke}{failure}; {left}the log is {log_path}")
     if interrupted:
         raise InterruptedRunError(interrupted, signal_number)
 
