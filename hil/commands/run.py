@@ -281,6 +281,7 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> Outcome:
     from rich.console import Console
     from rich.text import Text
 
+    from hil.commands.found_runs import how_to_stop
     from hil.live.daemon import Ending
     from hil.live.finding_lines import FindingLines, WaitingLines
     from hil.live.run import run_live
@@ -309,9 +310,15 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> Outcome:
         aside = Console(file=sys.stderr, quiet=console.is_terminal)
         waiting = WaitingLines(lambda line: aside.print(Text(line), soft_wrap=True))
 
+        resolved = log_path.parent / "scenario.toml"
+        untold = [how_to_stop(endpoints.joining, scenario, resolved)]
+
         def show(snapshot: Snapshot, elapsed: float | None) -> None:
+            # Its router is there by now.
+            while untold:
+                say(f"running; stop it by Ctrl-C, or from elsewhere by: {untold.pop()}")
             if page is not None:
-                page.see_to(log_path.parent / "scenario.toml", endpoints.joining)
+                page.see_to(resolved, endpoints.joining)
             for node, findings in list(snapshot.findings.items()):
                 lines.note(node, findings)
             # What is on the wire may look like markup.

@@ -19,6 +19,7 @@ from hil.live.crew import Crew, processes_of
 from hil.live.daemon import Ending
 from hil.live.disk_watch import refuse_full_disk
 from hil.live.run_monitor import RunMonitor, Snapshot
+from hil.live.runs_here import found_here, own_folder
 from hil.log.written_aside import write_text_aside
 from hil.nodes.findings import named_findings
 from hil.nodes.link_nodes import leader_standstill, standstill
@@ -96,6 +97,7 @@ def run_live(
     with ExitStack() as held:
         if endpoints.listen:
             held.callback(close_session, open_session(endpoints))
+        held.enter_context(found_here(endpoints.joining, resolved, own_folder()))
         supervisor = _Supervisor(
             scenario, resolved, log_path, endpoints.joining, crew, give_up=lambda: ending.asked
         )

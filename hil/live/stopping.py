@@ -48,12 +48,16 @@ class Stopped:
         """Whether all were told to stand and heard of, nobody told one otherwise, and none moves on."""
         return not (self.driven or self.unheard or any(each.moves for each in self.rest))
 
+    @property
+    def told(self) -> str:
+        """Who was told, and why, in words."""
+        return f"{', '.join(self.robots)} told to stand ({self.reason})"
+
     def line(self) -> str:
-        """The same in words, with what to do."""
+        """All of it in words, with what to do."""
         rest = rest_words(self.rest)
         if self.done:
-            told = f"{', '.join(self.robots)} told to stand ({self.reason})"
-            return f"{told}: {rest}" if rest else told
+            return f"{self.told}: {rest}" if rest else self.told
         driven = [f"somebody still drives {', '.join(self.driven)}"] if self.driven else []
         unheard = [f"nothing was heard of {', '.join(self.unheard)} on this wire"] if self.unheard else []
         nodes = [f"{', '.join(self.nodes)} did stop"] if self.nodes else []
