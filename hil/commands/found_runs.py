@@ -16,6 +16,7 @@ from hil.live.runs_here import RunHere, own_folder, runs_here
 from hil.log.report_json import note
 from hil.scenario.files import load_scenario
 from hil.scenario.schema import Scenario
+from hil.wire import topics
 from hil.wire.key_layout import layout_of
 from hil.wire.lab_robots import robots_of
 from hil.wire.role_keys import RoleKeys
@@ -98,14 +99,11 @@ def how_to_stop(joining: Endpoints, scenario: Scenario, path: Path) -> str:
 
 
 def _is_usual(scenario: Scenario) -> bool:
-    """Whether robots are told to stand as those of the usual scenario are."""
-    usual = load_scenario(USUAL)
-    mine, theirs = (
-        ([(each.name, each.odom, each.cmd_vel) for each in robots_of(one)], layout_of(one), _type(one))
-        for one in (scenario, usual)
-    )
-    return mine == theirs
+    """Whether robots are told to stand, and heard, as those of the usual scenario are."""
+    return _heard_at(scenario) == _heard_at(load_scenario(USUAL))
 
 
-def _type(scenario: Scenario) -> str:
-    return scenario.controller.command_type
+def _heard_at(scenario: Scenario) -> list[str]:
+    key, robots = layout_of(scenario).heard, robots_of(scenario)
+    where = [word for each in robots for word in (each.name, key(each.odom), key(each.cmd_vel))]
+    return [scenario.controller.command_type, key(topics.STOP), *where]

@@ -34,7 +34,8 @@ def command(
     """Show the lab of SCENARIO in a browser while it drives: what is believed, decided and wrong, and a stop.
 
     The page is served on this machine only, unless --live-address says otherwise; then the address that is
-    printed has a token, without which nobody sees or stops anything.
+    printed has a token, without which nobody sees or stops anything. Without --connect, where nobody is at
+    the usual endpoint, it shows the one run of yours on this machine.
     """
     from hil.commands.found_runs import lab_or_run
     from hil.live.daemon import Ending

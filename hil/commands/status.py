@@ -41,7 +41,10 @@ def command(
     as_json: bool,
     overrides: tuple[str, ...],
 ) -> None:
-    """Show daemons, bodies, robots, ages and refusals of the lab of SCENARIO, live."""
+    """Show daemons, bodies, robots, ages and refusals of the lab of SCENARIO, live.
+
+    Without --connect, where nobody is at the usual endpoint, it shows the one run of yours on this machine.
+    """
     from rich.live import Live
 
     from hil.commands.found_runs import lab_or_run

@@ -86,6 +86,7 @@ def found_here(joining: Endpoints, scenario: Path, folder: Path) -> Iterator[Non
     finally:
         if descriptor >= 0:
             with suppress(OSError):
+                aside.unlink(missing_ok=True)
                 path.unlink(missing_ok=True)
             os.close(descriptor)
 

@@ -18,6 +18,7 @@ from hil.commands.found_runs import how_to_stop
 from hil.emulator.lab_messages import odometry_message
 from hil.live.runs_here import found_here, own_folder
 from hil.scenario.files import load_scenario, scenario_text
+from hil.scenario.guarded import with_guards
 from hil.wire.message_types import String
 from hil.wire.messages import decode_as, encode
 from hil.wire.pubsub import Wire
@@ -215,7 +216,8 @@ def test_the_usual_lab_is_shown_whatever_runs_here(
 def test_how_to_stop_names_what_is_needed_and_no_more() -> None:
     joining, path = Endpoints(connect="tcp/127.0.0.1:4"), Path("my runs/scenario.toml")
     usual = load_scenario("turtlebot3", ["estimator.kind=ukf", "run.duration_s=7"])
-    assert how_to_stop(joining, usual, path) == "abreast stop --connect tcp/127.0.0.1:4"
+    for each in (usual, with_guards(usual)):
+        assert how_to_stop(joining, each, path) == "abreast stop --connect tcp/127.0.0.1:4"
     for key in ("follower.name=f", "controller.command_type=Twist"):
         other = load_scenario("turtlebot3", [key])
         assert how_to_stop(joining, other, path) == (

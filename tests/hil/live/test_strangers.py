@@ -52,6 +52,7 @@ def ended(run: Run) -> dict[str, Any]:
     """The summary of a run that was stopped before its time."""
     code, summary, err = run.finish()
     assert code == 1, err
+    assert f"running; stop it by Ctrl-C, or from elsewhere by: abreast stop --connect {run.endpoint}\n" in err
     assert re.search(r"stopped (before its time|after [0-9.]+ s): ", err)
     assert ("the run broke down" in err) == ("stopped before its time" in err)
     (found,) = (each for each in summary["findings"] if each["name"] == "stopped_by")
