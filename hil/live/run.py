@@ -241,7 +241,10 @@ class _Supervisor:
         return f"stopped {when}: {reason} (by {who})"
 
     def _tell_who_stopped(self, who: str, reason: str) -> None:
-        """Leave in the log by whom and why the run was stopped."""
+        """Leave in the log by whom and why the run was stopped, as far as our keys let us."""
+        if not self._wire.may_publish(topics.DIAGNOSTICS):
+            # Keys of an operator that were made before he might; the robots are to be stopped all the same.
+            return
         now_ns = time.time_ns()
         found = named_findings(stop_finding(who, reason))
         report = diagnostics(SUPERVISOR, now_ns, f"stopped by {who}: {reason}", found)

@@ -104,6 +104,18 @@ def test_a_stop_after_that_ends_the_run_before_its_time(lab: tuple[Wire, _Superv
     assert outcome.stopped
 
 
+def test_a_stop_is_heeded_where_our_keys_do_not_let_us_say_by_whom(
+    lab: tuple[Wire, _Supervisor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wire, supervisor = lab
+    ours = supervisor._wire
+    monkeypatch.setattr(ours, "_allowed", frozenset({topics.STOP}))
+    wire.subscribe([topics.DIAGNOSTICS])
+    outcome = outcome_of(supervisor, wire, set_off(), STOP)
+    assert outcome.stopped
+    assert not any(b"stopped_by" in event.payload for event in iter(lambda: wire.inbox.take(0.2), None))
+
+
 def test_a_guard_that_holds_its_robot_ends_the_run(lab: tuple[Wire, _Supervisor]) -> None:
     wire, supervisor = lab
     values = {"latched": "fence", "latched_by": "follower"}
