@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -29,6 +30,14 @@ SLOWEST = (
     "tests/hil/lockstep/test_chain_run.py",
 )
 """Files whose tests take longest, the longest first: begun last, one would keep a worker busy alone."""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def runs_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """No test finds, and stops, the runs of another worker or of whoever runs the tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(tmp_path_factory.mktemp("runtime")))
+        yield
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

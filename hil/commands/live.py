@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from hil.commands.page_options import page_options
-from hil.commands.wire_options import endpoints_of, wire_options
+from hil.commands.wire_options import wire_options
 from hil.log.report_json import note
 
 _NICENESS = 5
@@ -34,8 +34,10 @@ def command(
     """Show the lab of SCENARIO in a browser while it drives: what is believed, decided and wrong, and a stop.
 
     The page is served on this machine only, unless --live-address says otherwise; then the address that is
-    printed has a token, without which nobody sees or stops anything.
+    printed has a token, without which nobody sees or stops anything. Without --connect, where nobody is at
+    the usual endpoint, it shows the one run of yours on this machine.
     """
+    from hil.commands.found_runs import lab_or_run
     from hil.live.daemon import Ending
     from hil.live.priority import step_aside
     from hil.live_page.admission import Admission
@@ -53,10 +55,11 @@ def command(
     from hil.scenario.guarded import with_guards
     from hil.wire.session import allowed_keys, close_session, open_session
 
-    chosen = load_scenario(scenario, overrides)
-    if listening is None:
+    lab = lab_or_run(connect, zenoh_config, secure, "operator", scenario)
+    chosen = load_scenario(lab.scenario, overrides)
+    if listening is None and not lab.is_run:
         chosen = with_guards(chosen)
-    endpoints = endpoints_of(connect, None, zenoh_config, secure, "operator")
+    endpoints = lab.endpoints
     ending = Ending()
     ending.on_signals()
     if tethered:

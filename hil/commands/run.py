@@ -207,6 +207,7 @@ def _run(chosen: Scenario, folder: Path, live: _Live | None, figures: Kind | Non
     if log_path.exists():
         raise UsageError(f"{log_path} exists already; give another --out, or move it away")
     failure, left, interrupted, signal_number = "", "", "", 0
+    broke = "the run broke down: "
     timing: dict[str, dict[str, float]] = {}
     if live is None:
         timing["lockstep"], interrupted, signal_number = _lockstep(chosen, named)
@@ -214,6 +215,9 @@ def _run(chosen: Scenario, folder: Path, live: _Live | None, figures: Kind | Non
         outcome = _live(chosen, named, live)
         failure, left, interrupted = outcome.failure, f"{outcome.robots}, ", _interrupted(outcome)
         signal_number = outcome.signal
+        if outcome.stopped:
+            # As somebody wanted it: no words that alarm.
+            broke = ""
         if outcome.recorded and not log_path.exists():
             gone = f"log {log_path} is not there any more: somebody moved or deleted it during the run"
             raise CheckFailedError(f"{failure}; {gone}" if failure else gone)
@@ -232,7 +236,7 @@ def _run(chosen: Scenario, folder: Path, live: _Live | None, figures: Kind | Non
     finally:
         # Also if there is no room for a verdict, say: what went wrong first is what to tell.
         if failure:
-            raise CheckFailedError(f"the run broke down: {failure}; {left}the log is {log_path}")
+            raise CheckFailedError(f"{broke}{failure}; {left}the log is {log_path}")
     if interrupted:
         raise InterruptedRunError(interrupted, signal_number)
 
@@ -279,6 +283,7 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> Outcome:
     from rich.console import Console
     from rich.text import Text
 
+    from hil.commands.found_runs import how_to_stop
     from hil.live.daemon import Ending
     from hil.live.finding_lines import FindingLines, WaitingLines
     from hil.live.run import run_live
@@ -307,9 +312,15 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> Outcome:
         aside = Console(file=sys.stderr, quiet=console.is_terminal)
         waiting = WaitingLines(lambda line: aside.print(Text(line), soft_wrap=True))
 
+        resolved = log_path.parent / "scenario.toml"
+        untold = [how_to_stop(endpoints.joining, scenario, resolved)]
+
         def show(snapshot: Snapshot, elapsed: float | None) -> None:
+            # Its router is there by now.
+            while untold:
+                say(f"running; stop it by Ctrl-C, or from elsewhere by: {untold.pop()}")
             if page is not None:
-                page.see_to(log_path.parent / "scenario.toml", endpoints.joining)
+                page.see_to(resolved, endpoints.joining)
             for node, findings in list(snapshot.findings.items()):
                 lines.note(node, findings)
             # What is on the wire may look like markup.

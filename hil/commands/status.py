@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hil.commands.wire_options import endpoints_of, wire_options
+from hil.commands.wire_options import wire_options
 from hil.errors import CheckFailedError, UsageError
 from hil.log.report_json import print_with_nulls, result_console
 
@@ -41,9 +41,13 @@ def command(
     as_json: bool,
     overrides: tuple[str, ...],
 ) -> None:
-    """Show daemons, bodies, robots, ages and refusals of the lab of SCENARIO, live."""
+    """Show daemons, bodies, robots, ages and refusals of the lab of SCENARIO, live.
+
+    Without --connect, where nobody is at the usual endpoint, it shows the one run of yours on this machine.
+    """
     from rich.live import Live
 
+    from hil.commands.found_runs import lab_or_run
     from hil.live.lab_state import LabState, hear_for
     from hil.scenario.files import load_scenario
     from hil.wire.pubsub import joined
@@ -53,11 +57,11 @@ def command(
     wanted = [name.strip() for name in needs.split(",")] if needs is not None else []
     if not all(wanted):
         raise UsageError(f"--needs {needs!r}: expected names of nodes, by commas")
-    chosen = load_scenario(scenario, overrides)
+    lab = lab_or_run(connect, zenoh_config, secure, "viewer", scenario)
+    chosen = load_scenario(lab.scenario, overrides)
     state = LabState(chosen)
     clock = time.monotonic
-    endpoints = endpoints_of(connect, None, zenoh_config, secure, "viewer")
-    with joined(endpoints, chosen, patience=3.0) as wire:
+    with joined(lab.endpoints, chosen, patience=3.0) as wire:
         wire.subscribe(state.topics, shown=False)
         take = wire.inbox.take
         hear_for(state, take, clock, clock() + _FIRST_LOOK_S)

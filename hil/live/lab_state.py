@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from formation.pose import STANDSTILL, Motion
+from hil.guard.report import GUARDS
 from hil.live.reported_number import reported_number
+from hil.nodes.at_rest import own_motion
 from hil.nodes.findings import findings_in, findings_json
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
@@ -60,6 +62,7 @@ class LabState:
         self._stamped = scenario.controller.command_type == "TwistStamped"
         self.robots = {each.cmd_vel: each.name for each in robots}
         self._wheels = {each.name: each.odom for each in robots}
+        self._wheel_topics = frozenset(self._wheels.values())
         self.wanted = tuple(each.body for each in robots)
         self.robot_topics = (*self.robots, *self._wheels.values())
         self.topics = (
@@ -74,6 +77,7 @@ class LabState:
         self._daemons: dict[str, tuple[Heard, msg.DiagnosticStatus]] = {}
         self.drives: dict[str, Motion] = {}
         self._driven_at: dict[str, float] = {}
+        self._odometry: dict[str, bytes] = {}
         self.stops: list[str] = []
         self.malformed = 0
 
@@ -95,6 +99,9 @@ class LabState:
                         self._bodies.setdefault(name, Heard()).note(now)
             elif event.topic == topics.STOP:
                 self.stops = [*self.stops[-9:], decode_as(event.payload, msg.String).data]
+            elif event.topic in self._wheel_topics:
+                # Read when somebody asks: of many robots it is most of what comes.
+                self._odometry[event.topic] = event.payload
             elif event.topic in self.robots:
                 self._driven_at[event.topic], before = now, self._driven_at.get(event.topic, -math.inf)
                 # Only what can be read says that a robot is to stand: its driver may take another type.
@@ -123,6 +130,14 @@ class LabState:
             name
             for topic, name in self.robots.items()
             if topic not in self._heard and self._wheels[name] not in self._heard
+        ]
+
+    def stopped_nodes(self) -> list[str]:
+        """Nodes that say that they were stopped: guards that hold their robots, controllers, a leader."""
+        return [
+            name.removeprefix("abreast/")
+            for name, (_, status) in sorted(self._daemons.items())
+            if _is_stopped(status)
         ]
 
     def unwell(self, names: Sequence[str], now: float) -> list[str]:
@@ -175,10 +190,13 @@ class LabState:
     def _robot(self, topic: str, name: str, now: float) -> dict[str, Any]:
         drive, told = self.drives.get(topic), self._heard.get(topic)
         wheels = self._heard.get(self._wheels[name])
+        odometry = self._odometry.get(self._wheels[name])
+        own = own_motion(odometry) if odometry is not None else None
+        v, u = own or (None, None)
         return {
             "name": name,
             "told": {"v": drive.v, "u": drive.u, **_when(told, now)} if drive and told else None,
-            "odometry": _when(wheels, now) if wheels else None,
+            "odometry": {"v": v, "u": u, **_when(wheels, now)} if wheels else None,
         }
 
 
@@ -209,12 +227,21 @@ def told_lines(state: LabState, now: float) -> Iterable[tuple[str, str, str]]:
         drive = each["told"]
         says = f"told v {drive['v']:+.3f} m/s, u {drive['u']:+.2f} rad/s" if drive else "told nothing"
         yield f"robot {each['name']}", _age(drive) if drive else "-", says
-        if each["odometry"] is None:
+        if (turned := each["odometry"]) is None:
             yield "", "", "no odometry"
+        elif turned["v"] is None:
+            yield "", _age(turned), "odometry that cannot be read"
         else:
-            yield "", _age(each["odometry"]), "odometry"
+            yield "", _age(turned), f"odometry v {turned['v']:+.3f} m/s, u {turned['u']:+.2f} rad/s"
     for reason in told["stops"][-1:]:
         yield "stop", "", reason
+
+
+def _is_stopped(status: msg.DiagnosticStatus) -> bool:
+    values = {each.key: each.value for each in status.values}
+    if status.name.removeprefix("abreast/").startswith(GUARDS):
+        return bool(values.get("latched"))
+    return bool(reported_number(values.get("decided.stopped", ""))) or status.message.startswith("stopped")
 
 
 def _when(heard: Heard, now: float) -> dict[str, float]:

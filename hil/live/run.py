@@ -18,6 +18,7 @@ from hil.live.crew import Crew, processes_of
 from hil.live.daemon import Ending
 from hil.live.disk_watch import refuse_full_disk
 from hil.live.run_monitor import RunMonitor, Snapshot
+from hil.live.runs_here import found_here, own_folder
 from hil.log.resolved_scenario import write_resolved
 from hil.nodes.findings import named_findings
 from hil.nodes.link_nodes import leader_standstill, standstill
@@ -59,7 +60,8 @@ class Outcome:
     """How a live run ended: what failed (empty: nothing), whether it was interrupted, how long it drove.
 
     ``robots``: in words, what was seen of how the robots were left. ``recorded``: the recorder was heard, so
-    that there was a log. ``signal``: what interrupted it.
+    that there was a log. ``signal``: what interrupted it. ``stopped``: nothing broke down, somebody said
+    stop, as ``failure`` says.
     """
 
     failure: str
@@ -68,6 +70,7 @@ class Outcome:
     robots: str
     signal: int = 0
     recorded: bool = False
+    stopped: bool = False
 
 
 def run_live(
@@ -86,6 +89,7 @@ def run_live(
     with ExitStack() as held:
         if endpoints.listen:
             held.callback(close_session, open_session(endpoints))
+        held.enter_context(found_here(endpoints.joining, resolved, own_folder()))
         supervisor = _Supervisor(
             scenario, resolved, log_path, endpoints.joining, crew, give_up=lambda: ending.asked
         )
@@ -121,6 +125,7 @@ class _Supervisor:
         self._monitor = RunMonitor(self._session, pairs, layout_of(scenario), tuple(self._wheels))
         self._children = Children()
         self._drivers: list[str] = []
+        self._asked_to_stop = False
         for name, daemon, followers in processes_of(self._links, crew.daemons):
             arguments = [str(resolved), *joining.options, *crew.options(daemon, log_path, names)]
             for follower in followers:
@@ -141,7 +146,7 @@ class _Supervisor:
             self._arm(snapshot)
             if set_off is None and snapshot.motion_since_ns is not None:
                 set_off = now - (time.time_ns() - snapshot.motion_since_ns) * 1e-9
-            failure = failure or self._stopped(snapshot, set_off is not None)
+            failure = failure or self._stopped(snapshot, None if set_off is None else now - set_off)
             if len(snapshot.heard) > known:
                 begun, known = now, len(snapshot.heard)
             patience = START_TIMEOUT if self._all_heard(snapshot) else FIRST_WORD_TIMEOUT
@@ -160,7 +165,8 @@ class _Supervisor:
             unseen += f" within {STANDSTILL_TIMEOUT:g} s; use {'their' if len(moving) > 1 else 'its'} switch"
             failure = f"{failure}; {unseen}" if failure else unseen
         recorded = "recorder" in self._monitor.snapshot.heard
-        return Outcome(failure, ending.asked, driven, self._how_left(), ending.signal, recorded)
+        stopped = self._asked_to_stop and not moving
+        return Outcome(failure, ending.asked, driven, self._how_left(), ending.signal, recorded, stopped)
 
     def close(self) -> None:
         """Who drives robots first, its last word being a standstill; recorder last, to miss nothing."""
@@ -197,33 +203,40 @@ class _Supervisor:
                 self._armed.add(name)
                 self._wire.publish(topics.ARM, encode(msg.String(data=name.removeprefix(GUARDS))))
 
-    def _stopped(self, snapshot: Snapshot, driving: bool) -> str:
+    def _stopped(self, snapshot: Snapshot, driven_s: float | None) -> str:
         """That somebody stopped everybody, or a guard its robot, before the time; empty for neither.
+
+        ``driven_s``: since the leader set off [s], None before.
 
         A daemon that breaks down says stop with its last breath: then its end is what is wrong. Before the
         leader sets off a guard may yet be armed.
         """
-        held = next(iter(snapshot.held.items()), None) if driving else None
+        held = next(iter(snapshot.held.items()), None) if driven_s is not None else None
         if snapshot.stopped is None and held is None:
             return ""
         if failure := self._failure(_LAST_BREATH):
             return failure
-        when = "stopped before its time" if driving else "stopped before the leader set off"
         if snapshot.stopped is not None:
+            self._asked_to_stop = True
             who, reason = snapshot.stopped_by, snapshot.stopped
+            when = "before the leader set off" if driven_s is None else f"after {max(driven_s, 0.0):.1f} s"
         else:
             assert held is not None
             who, reason = held[1].who, f"{held[0]} {held[1].text}"
+            when = "before its time"
         if UNSIGNED in who:
             clients = self._wire.clients()
             clients.ask()
             clients.wait(_ANSWER_S)
             who = named_suspects(who, clients.suspects())
         self._tell_who_stopped(who, reason)
-        return f"{when}: {reason} (by {who})"
+        return f"stopped {when}: {reason} (by {who})"
 
     def _tell_who_stopped(self, who: str, reason: str) -> None:
-        """Leave in the log by whom and why the run was stopped."""
+        """Leave in the log by whom and why the run was stopped, as far as our keys let us."""
+        if not self._wire.may_publish(topics.DIAGNOSTICS):
+            # Keys of an operator that were made before he might; the robots are to be stopped all the same.
+            return
         now_ns = time.time_ns()
         found = named_findings(stop_finding(who, reason))
         report = diagnostics(SUPERVISOR, now_ns, f"stopped by {who}: {reason}", found)

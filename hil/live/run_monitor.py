@@ -14,6 +14,7 @@ from estimation.tracking.tracker import Status
 from formation.pose import Motion
 from hil.guard.report import GUARDS
 from hil.live.reported_number import reported_number
+from hil.nodes.at_rest import stands
 from hil.nodes.findings import Findings, findings_in
 from hil.nodes.leader_driver import stop_reason
 from hil.scenario.links import STARTERS
@@ -30,8 +31,6 @@ from hil.wire.undeclare import undeclare
 
 M = TypeVar("M", bound=msg.Message)
 
-_STILL_V = 0.01
-_STILL_U = 0.05
 _LONGEST_GLANCE = 0.25
 _COMPILES_S = 15.0
 """Between two looks [s]; more than this says that the machine stood still."""
@@ -76,14 +75,13 @@ class Snapshot:
         """Whether all robots stand, as far as wheel encoders can tell."""
         truths = self.truths.values()
         return len(truths) == len(self.followers) and all(
-            max(abs(truth.v1), abs(truth.v2)) < _STILL_V and max(abs(truth.u1), abs(truth.u2)) < _STILL_U
-            for truth in truths
+            stands(Motion(truth.v1, truth.u1)) and stands(Motion(truth.v2, truth.u2)) for truth in truths
         )
 
     def stands(self, wheels: str) -> bool:
         """Whether a real robot says that it stands, by the topic of its odometry."""
         motion = self.wheels.get(wheels)
-        return motion is not None and abs(motion.v) < _STILL_V and abs(motion.u) < _STILL_U
+        return motion is not None and stands(motion)
 
     def waits_for(self, names: Iterable[str]) -> str:
         """What the start waits for, in words, empty for nothing that anybody tells.

@@ -127,7 +127,8 @@ class OrderLine:
         except Exception as error:
             self._told("failed", f"not known what came of it ({error}); use the robot's switch")
         else:
-            self._told("done" if stopped.done else "failed", stopped.line())
+            # The page itself tells of each robot whether it stands, for as long as it is looked at.
+            self._told(*(("done", stopped.told) if stopped.done else ("failed", stopped.line())))
         finally:
             if wire is not None:
                 wire.close()

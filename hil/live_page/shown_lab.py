@@ -15,6 +15,7 @@ from hil.live_page.arrivals import Arrivals
 from hil.live_page.orbit import Orbit, is_due
 from hil.live_page.shown_estimate import shown_estimate
 from hil.live_page.shown_numbers import clipped, shown
+from hil.nodes.at_rest import stands
 from hil.scenario.links import STARTERS, links_of
 from hil.scenario.parts import may_change_sides
 from hil.scenario.schema import Scenario
@@ -36,10 +37,6 @@ _MOST_NODES, _MOST_FINDINGS, _MOST_CAUSES, _LONGEST_CAUSE = 60, 5, 10, 60
 
 _FRESH_S, _SILENT_S = 1.0, 3.0
 """For so long [s] what moves is as it was said, and a guard that said something is there."""
-
-_STILL_V, _STILL_U = 0.01, 0.05
-"""What wheels say of a robot that stands [m/s, rad/s]."""
-
 
 _SIDES = frozenset(side.value for side in Side)
 
@@ -193,7 +190,7 @@ class ShownLab:
             "told_age": self._arrivals.age_s(robot.cmd_vel, now),
             "own": [shown(own.v), shown(own.u)] if own else None,
             "own_age": self._arrivals.age_s(robot.odom, now),
-            "stands": abs(own.v) < _STILL_V and abs(own.u) < _STILL_U if own else None,
+            "stands": stands(own) if own else None,
         }
 
     def _told(self, robot: LabRobot) -> Motion | None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from formation.pose import STANDSTILL, Motion
+from hil.nodes.at_rest import stands
 from hil.nodes.findings import Findings
 
 _ASKED_V, _ASKED_U = 0.03, 0.2
-_STILL_V, _STILL_U = 0.01, 0.05
 _PATIENCE_NS = 1_000_000_000
 """Far longer than a robot's lag and the age of an estimate together."""
 
@@ -29,7 +29,7 @@ def with_answer(watch: AnswerWatch, now_ns: int, asked: Motion, shown: Motion | 
     Speeds in m/s, turn rates in rad/s. What asks for hardly any motion asks for nothing here.
     """
     asks = abs(asked.v) >= _ASKED_V or abs(asked.u) >= _ASKED_U
-    if not asks or shown is None or abs(shown.v) >= _STILL_V or abs(shown.u) >= _STILL_U:
+    if not asks or shown is None or not stands(shown):
         return UNASKED
     # The clock may have been set back.
     since_ns = watch.since_ns if 0 < watch.since_ns <= now_ns else now_ns

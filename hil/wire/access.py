@@ -95,7 +95,7 @@ def access_of(scenario: Scenario) -> dict[Role, Access]:
         "robot": lab.wheels,
         "bridge": outside,
         "emulator": outside | made | lab.played | _told_by_emulator(scenario, lab),
-        "operator": lab.wanted | lab.orders,
+        "operator": lab.wanted | lab.orders | _REPORTS,
         "viewer": frozenset(),
     }
     everything = frozenset({*types_of(scenario), *source_topics(scenario)}) - {*ONLY_IN_LOGS}

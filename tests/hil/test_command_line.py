@@ -193,6 +193,19 @@ def test_a_run_that_broke_down_says_so_even_without_room_for_a_verdict(
     assert told in capsys.readouterr().err.splitlines()[-1]
 
 
+def test_a_run_that_somebody_stopped_did_not_break_down(
+    tmp_path: Path, short_log: Log, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stopped(_scenario: Scenario, log_path: Path, _live: object) -> Outcome:
+        log_path.write_bytes(short_log.path.read_bytes())
+        return Outcome("stopped after 12.7 s: enough (by me)", False, 12.7, "the robots stand", stopped=True)
+
+    monkeypatch.setattr("hil.commands.run._live", stopped)
+    assert main_code(["run", "--out", str(tmp_path)]) == 1
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said.startswith("abreast: stopped after 12.7 s: enough (by me); the robots stand, the log is ")
+
+
 def test_pieces_of_a_log_are_made_whole_or_put_aside(
     tmp_path: Path, short_log: Log, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

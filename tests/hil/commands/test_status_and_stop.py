@@ -45,9 +45,8 @@ def again(wire: Wire, *said: tuple[str, bytes]) -> Iterator[None]:
         saying.join()
 
 
-def odometry(robot: str) -> tuple[str, bytes]:
-    standing = odometry_message(5, robot, Pose(0.0, 0.0, 0.0), STANDSTILL)
-    return f"{robot}/odom", encode(standing)
+def odometry(robot: str, moves: Motion = STANDSTILL) -> tuple[str, bytes]:
+    return f"{robot}/odom", encode(odometry_message(5, robot, Pose(0.0, 0.0, 0.0), moves))
 
 
 def drive(v: float, *, stamped: bool = True) -> bytes:
@@ -69,12 +68,30 @@ def test_a_stop_reaches_everybody_with_its_reason(lab: tuple[str, Wire]) -> None
     with again(wire, *ROBOTS):
         done = ran("stop", "enough of it", "--connect", endpoint)
     assert done.returncode == 0, done.stderr
-    assert "leader, follower told to stand (enough of it)" in done.stdout
+    assert "leader, follower told to stand (enough of it): leader stands (odometry 0.000 m/s" in done.stdout
     heard: dict[str, bytes] = {}
     while (event := wire.inbox.take(0.2)) is not None:
         heard[event.topic] = event.payload
     assert set(heard) == {"stop", "leader/cmd_vel", "follower/cmd_vel"}
     assert decode_as(heard["stop"], String).data == "enough of it"
+
+
+def test_a_stop_says_who_moves_on_by_its_odometry(lab: tuple[str, Wire]) -> None:
+    endpoint, wire = lab
+    with again(wire, odometry("leader"), odometry("follower", Motion(0.12, 0.0))):
+        done = ran("stop", "--connect", endpoint)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "leader stands (" in done.stderr
+    assert "follower was told to stand and still moves at 0.12 m/s; use the robot's switch" in done.stderr
+
+
+def test_a_stop_by_other_names_says_whose_guards_stopped(lab: tuple[str, Wire]) -> None:
+    endpoint, wire = lab
+    held = diagnostics("guard/robot7", 5, "latched (stopped): by hand", {"latched": "stopped"})
+    with again(wire, odometry("robot7"), ("diagnostics", encode(held))):
+        done = ran("stop", "--connect", endpoint)
+    assert done.returncode == 1
+    assert "nothing was heard of leader, follower on this wire; guard/robot7 did stop; " in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -82,6 +82,33 @@ def test_a_robot_is_heard_of_by_its_odometry_or_by_what_it_is_told() -> None:
     assert state.unheard() == []
 
 
+def test_odometry_is_shown_with_what_it_says() -> None:
+    state = LabState(SCENARIO)
+    moves = odometry_message(5, "leader", Pose(0.0, 0.0, 0.0), Motion(0.1, -0.25))
+    told(state, "leader/odom", moves, 1.0)
+    state.hear(Event("follower/odom", b"?"), 1.0)
+    leader, follower = (robot["odometry"] for robot in state.as_dict(1.0)["robots"])
+    assert (leader["v"], leader["u"], follower["v"]) == (0.1, -0.25, None)
+    said = [says for _, _, says in told_lines(state, 1.0)]
+    assert "odometry v +0.100 m/s, u -0.25 rad/s" in said
+    assert "odometry that cannot be read" in said
+
+
+def test_nodes_that_say_that_they_stopped_are_known() -> None:
+    state = LabState(SCENARIO)
+    said: dict[str, tuple[str, dict[str, object]]] = {
+        "guard/x": ("latched (stopped): by hand", {"latched": "stopped"}),
+        "guard/y": ("", {"latched": ""}),
+        "controller": ("", {"decided.stopped": 12}),
+        "controller/z": ("", {"decided.stopped": 0}),
+        "leader": ("stopped: by hand", {}),
+        "estimator": ("", {}),
+    }
+    for name, (problem, values) in said.items():
+        told(state, topics.DIAGNOSTICS, diagnostics(name, 5, problem, values), 1.0)
+    assert state.stopped_nodes() == ["controller", "guard/x", "leader"]
+
+
 def test_a_count_that_is_no_number_is_not_one() -> None:
     state = LabState(SCENARIO)
     refused = {"refused.tilted": 7, "refused.late": "²", "refused.lost": "7" * 5000}

@@ -4,7 +4,9 @@ from typing import cast
 
 import pytest
 
+from formation.pose import STANDSTILL, Motion
 from hil.live import stopping
+from hil.live.coming_to_rest import Rest
 from hil.live.stopping import TIMES, Stopped, say_stop, stop_all
 from hil.scenario.files import load_scenario
 from hil.wire import topics
@@ -66,3 +68,26 @@ def test_who_is_driven_and_who_is_not_heard_are_both_named_with_what_to_do() -> 
     line = Stopped("by hand", ("a", "b", "c"), ("a",), ("b", "c")).line()
     assert line == "somebody still drives a; nothing was heard of b, c on this wire; use the robot's switch"
     assert Stopped("by hand", ("a", "b"), (), ()).line() == "a, b told to stand (by hand)"
+
+
+def test_who_moves_on_by_its_odometry_was_not_stopped() -> None:
+    stands, moves = Rest("a", STANDSTILL, 0.3), Rest("b", Motion(0.12, 0.0))
+    done = Stopped("by hand", ("a", "b"), rest=(stands, Rest("b")))
+    assert done.done
+    assert done.line() == (
+        "a, b told to stand (by hand): a stands (odometry 0.000 m/s, 0.00 rad/s after 0.3 s), "
+        "b: nothing heard of its odometry: look at the robot"
+    )
+    failed = Stopped("by hand", ("a", "b"), rest=(stands, moves))
+    assert not failed.done
+    assert failed.line() == (
+        "a stands (odometry 0.000 m/s, 0.00 rad/s after 0.3 s), "
+        "b was told to stand and still moves at 0.12 m/s; use the robot's switch"
+    )
+
+
+def test_who_did_stop_is_named_where_the_robots_are_others() -> None:
+    stopped = Stopped("by hand", ("a",), unheard=("a",), nodes=("controller", "guard/z"))
+    assert stopped.line() == (
+        "nothing was heard of a on this wire; controller, guard/z did stop; use the robot's switch"
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import time
@@ -51,7 +52,9 @@ def ended(run: Run) -> dict[str, Any]:
     """The summary of a run that was stopped before its time."""
     code, summary, err = run.finish()
     assert code == 1, err
-    assert "stopped before its time" in err
+    assert f"running; stop it by Ctrl-C, or from elsewhere by: abreast stop --connect {run.endpoint}\n" in err
+    assert re.search(r"stopped (before its time|after [0-9.]+ s): ", err)
+    assert ("the run broke down" in err) == ("stopped before its time" in err)
     (found,) = (each for each in summary["findings"] if each["name"] == "stopped_by")
     assert found["text"] == "{who}: {reason}".format(**summary["stopped_by"])
     assert summary["stopped_by"]["reason"] in " ".join(err.split())

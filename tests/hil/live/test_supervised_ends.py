@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections.abc import Iterator
@@ -99,8 +100,20 @@ def test_a_stop_that_cannot_be_read_does_too(lab: tuple[Wire, _Supervisor]) -> N
 def test_a_stop_after_that_ends_the_run_before_its_time(lab: tuple[Wire, _Supervisor]) -> None:
     wire, supervisor = lab
     outcome = outcome_of(supervisor, wire, set_off(), STOP)
-    assert outcome.failure.startswith("stopped before")
-    assert ": enough (by session " in outcome.failure
+    assert re.match(r"stopped after [0-9.]+ s: enough \(by session ", outcome.failure)
+    assert outcome.stopped
+
+
+def test_a_stop_is_heeded_where_our_keys_do_not_let_us_say_by_whom(
+    lab: tuple[Wire, _Supervisor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wire, supervisor = lab
+    ours = supervisor._wire
+    monkeypatch.setattr(ours, "_allowed", frozenset({topics.STOP}))
+    wire.subscribe([topics.DIAGNOSTICS])
+    outcome = outcome_of(supervisor, wire, set_off(), STOP)
+    assert outcome.stopped
+    assert not any(b"stopped_by" in event.payload for event in iter(lambda: wire.inbox.take(0.2), None))
 
 
 def test_a_guard_that_holds_its_robot_ends_the_run(lab: tuple[Wire, _Supervisor]) -> None:
@@ -111,6 +124,7 @@ def test_a_guard_that_holds_its_robot_ends_the_run(lab: tuple[Wire, _Supervisor]
     assert outcome.failure == (
         "stopped before its time: guard/follower latched (fence): outside (by follower)"
     )
+    assert not outcome.stopped
 
 
 def set_off() -> tuple[str, msg.Message]:
@@ -151,6 +165,7 @@ def test_what_robots_said_before_their_links_were_gone_is_no_standstill(
     assert outcome.failure.endswith(
         "; leader, follower have not been seen to stand within 1 s; use their switch"
     )
+    assert not outcome.stopped
     assert outcome.robots == "the robots were told to stand"
 
 
