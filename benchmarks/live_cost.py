@@ -22,12 +22,14 @@ from pathlib import Path
 from tornado.httpclient import HTTPRequest
 from tornado.websocket import WebSocketClosedError, websocket_connect
 
+from hil.live.priority import step_aside
+
 KINDS = ("no page", "nobody looks", "looked at")
 _SETTINGS = ("mocap.rate_hz=240", "mocap.latency_s=0")
 
 
 async def look(host: str) -> None:
-    """Look on until the server goes; as cheap as can be, as a browser in the lab is on another machine."""
+    """Look on until the server goes; as cheap as can be and last in line, as a browser is elsewhere."""
     with urllib.request.urlopen(f"http://{host}/token") as answer:
         token = answer.read().decode()
     socket = await websocket_connect(HTTPRequest(f"ws://{host}/lab", headers={"Origin": f"http://{host}"}))
@@ -63,7 +65,8 @@ def run(kind: str, duration_s: float, folder: Path) -> dict[str, float]:
     for line in process.stderr:
         if kind == KINDS[2] and "shown at http://" in line:
             host = line.split()[-1].split("/")[2]
-            looker = subprocess.Popen([sys.executable, "-m", "benchmarks.live_cost", "--look", host])
+            looking = [sys.executable, "-m", "benchmarks.live_cost", "--look", host]
+            looker = subprocess.Popen(looking, start_new_session=True)
     summary = json.loads(process.stdout.read())
     process.wait()
     if looker is not None:
@@ -95,6 +98,7 @@ if __name__ == "__main__":
     parser.add_argument("--look", default="")
     given = parser.parse_args()
     if given.look:
+        step_aside(19)
         asyncio.run(look(given.look))
     else:
         main(given.rounds, given.duration)
