@@ -36,7 +36,7 @@ LASTING = 0.5
 WORST = ("v1", "alpha1")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Watched:
     """What spells are looked for in: a span, what time in seconds counts from, and the columns."""
 

@@ -74,7 +74,8 @@ def found_here(joining: Endpoints, scenario: Path, folder: Path) -> Iterator[Non
     aside = path.with_suffix(".unfinished")
     descriptor = -1
     try:
-        with suppress(OSError):
+        # A name that is no text cannot be told; it is refused by who is to read it.
+        with suppress(OSError, UnicodeEncodeError):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             if _is_ours(folder):
                 descriptor = os.open(aside, os.O_CREAT | os.O_WRONLY | os.O_TRUNC | os.O_NOFOLLOW, 0o600)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from hil.errors import UsageError
 
 _PARAMETERS = "parameters."
+_AXES = {f"mocap.{name}": name for name in ("sigma_position", "sigma_heading", "latency_s", "loss")}
 _OPTIONS = {
     "estimator.kind": "--estimators A,B, or estimators in the specification",
     "run.seed": "--seed N, or seed in the specification",
@@ -44,20 +45,39 @@ def with_axes(grid: Any, axes: Sequence[str]) -> Any:
     return changed
 
 
-def refuse_of_axes(overrides: Sequence[str], of_cells: Sequence[str], source: str) -> None:
+def as_axes(overrides: Sequence[str], swept: Collection[str] = ()) -> tuple[list[str], list[str]]:
+    """Overrides of keys that are axes, as those, and all others: one value in place of the grid's.
+
+    ``swept``: parameters of a law that the grid goes through.
+
+    >>> as_axes(["mocap.loss=0.1", "mocap.jitter_s=0.01"])
+    (['loss=0.1'], ['mocap.jitter_s=0.01'])
+    """
+    axes, others = [], []
+    known = _AXES | {f"controller.{_PARAMETERS}{name}": f"{_PARAMETERS}{name}" for name in swept}
+    for override in overrides:
+        key, _, value = override.partition("=")
+        if (name := known.get(key.strip())) is None:
+            others.append(override)
+        else:
+            axes.append(f"{name}={value.strip()}")
+    return axes, others
+
+
+def refuse_lost(overrides: Sequence[str], of_cells: Sequence[str], source: str) -> None:
     """Raise :class:`UsageError` for overrides of keys that every cell sets by itself: they would be lost.
 
     ``of_cells``: the overrides of a cell.
     """
-    axes = {key for key in (each.partition("=")[0] for each in of_cells) if key not in _OPTIONS}
+    sets = {each.partition("=")[0] for each in of_cells}
     for override in overrides:
         key, _, value = override.partition("=")
         key = key.strip()
-        name = key.removeprefix("controller.").rpartition("mocap.")[2].rpartition("estimator.")[2]
         if key in _OPTIONS:
             raise UsageError(f"{source}: --set {override}: a sweep sets that itself; give {_OPTIONS[key]}")
-        if key in axes:
+        if key in sets:
+            name = _AXES.get(f"mocap.{key.rpartition('.')[2]}", key.removeprefix("controller."))
             raise UsageError(
-                f"{source}: --set {override}: is an axis of the sweep, which every cell sets itself; give "
+                f"{source}: --set {override}: every cell sets that itself, to the noise that it has; give "
                 f"--grid {name}={value}, or [grid] in the specification"
             )

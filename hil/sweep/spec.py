@@ -22,7 +22,7 @@ from hil.scenario.checked_toml import checked, locate, meant, read_toml
 from hil.scenario.files import load_scenario, with_overrides
 from hil.scenario.schema import Scenario
 from hil.scenario.section import Deviation, Probability, Span
-from hil.sweep.axes import refuse_of_axes, with_axes
+from hil.sweep.axes import as_axes, refuse_lost, with_axes
 from hil.sweep.refusals import refuse_unsweepable
 
 SHORTEST_S = 1.0
@@ -143,8 +143,8 @@ def load_sweep(
     """Read a specification by its shipped name, from a TOML file, or from what would stand in one.
 
     ``changes`` other than None override it; ``overrides`` of the scenario's keys come after those of the
-    specification. ``axes``: such as ``sigma_position=0.001,0.005`` or ``parameters.k=0,0.5``, in place of
-    those of the grid.
+    specification; one of an axis is its only value. ``axes``: such as ``sigma_position=0.001,0.005`` or
+    ``parameters.k=0,0.5``, in place of those of the grid.
 
     Raises :class:`UsageError` for whatever is wrong in it, in its scenario, or in any of its cells.
     """
@@ -154,7 +154,10 @@ def load_sweep(
     else:
         source, tree = "sweep", dict(given)
     tree |= {key: value for key, value in changes.items() if value is not None}
-    tree["grid"] = with_axes(tree.get("grid", {}), axes)
+    given_grid = tree.get("grid", {})
+    swept = given_grid.get("parameters", {}) if isinstance(given_grid, Mapping) else {}
+    as_given, overrides = as_axes(overrides, swept if isinstance(swept, Mapping) else ())
+    tree["grid"] = with_axes(given_grid, [*as_given, *axes])
     spec = checked(tree, SweepSpec, source)
     estimators = tuple(map(_settled_estimator, spec.estimators))
     spec = msgspec.structs.replace(spec, set=(*spec.set, *overrides), estimators=estimators)
@@ -166,7 +169,7 @@ def load_sweep(
             )
     scenario = load_scenario(spec.scenario, [*spec.set, f"run.duration_s={spec.duration_s!r}"])
     sweep = Sweep(spec, scenario)
-    refuse_of_axes(spec.set, sweep.cells()[0].overrides(), source)
+    refuse_lost(spec.set, sweep.cells()[0].overrides(), source)
     for cell in sweep.cells():
         refuse_unsweepable(sweep.scenario_of(cell))
     return sweep

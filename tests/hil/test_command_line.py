@@ -170,7 +170,7 @@ def test_a_log_that_fills_its_disk_is_whole_and_both_are_named(
             in said
         )
         assert read_log(out / "run.mcap").messages > 100
-        assert [each.name for each in out.iterdir()] == ["run.mcap"]
+        assert {each.name for each in out.iterdir()} == {"run.mcap", "scenario.toml"}
 
 
 def main_code(arguments: list[str]) -> object:

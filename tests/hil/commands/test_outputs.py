@@ -28,7 +28,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     return said
 
 
-BAD = ("folder", "empty", "noise", "missing", LONG, "not\udcff", "folder/below", "empty/below")
+BAD = ("folder", "empty", "rubbish", "missing", LONG, "not\udcff", "folder/below", "empty/below")
 """Names in a folder of which none is anything that a command can read."""
 
 READERS = [
@@ -69,7 +69,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, short_log: Log) -> Pat
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder").mkdir()
     (tmp_path / "empty").touch()
-    (tmp_path / "noise").write_bytes(bytes(range(256)) * 40)
+    (tmp_path / "rubbish").write_bytes(bytes(range(256)) * 40)
     (tmp_path / os.fsdecode(b"not\xff")).write_bytes(b"\xff\xfe\x00\xd8")
     (tmp_path / "tum.txt").write_text("0 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n")
     (tmp_path / "table.csv").write_text("t,x\n0,1\n")

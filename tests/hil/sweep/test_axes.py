@@ -24,12 +24,21 @@ def test_parameters_of_a_law_are_an_axis(tmp_path: Path) -> None:
     assert [dict(cell.parameters)["k"] for cell in sweep.cells()[:2]] == [0.0, 0.5]
 
 
+def test_a_set_of_an_axis_is_its_only_value(tmp_path: Path) -> None:
+    sweep = load_sweep("default", ["mocap.loss=0.1", "mocap.jitter_s=0.004"])
+    assert {cell.loss for cell in sweep.cells()} == {0.1}
+    assert sweep.scenario_of(sweep.cells()[0]).mocap.jitter_s == 0.004
+    law = tmp_path / "swept.py"
+    law.write_text("def swept(shape, leader, gains):\n    return leader.v1, gains.k\n")
+    grid = {"sigma_position": [1e-3], "sigma_heading": [1e-2], "parameters": {"k": [0.0, 1.0]}}
+    given = [f"controller.law={law}:swept", "controller.parameters.k=0.3"]
+    assert [dict(cell.parameters) for cell in load_sweep({"grid": grid}, given).cells()] == [{"k": 0.3}]
+
+
 @pytest.mark.parametrize(
     ("override", "instead"),
     [
-        ("mocap.sigma_position=0.002", "--grid sigma_position=0.002"),
         ("estimator.sigma_heading=0.01", "--grid sigma_heading=0.01"),
-        ("mocap.loss=0.1", "--grid loss=0.1"),
         ("estimator.kind=ukf", "--estimators A,B"),
         ("run.seed=3", "--seed N"),
         ("run.duration_s=5", "--duration S"),
