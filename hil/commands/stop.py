@@ -103,7 +103,8 @@ def _stop_here(usual: Endpoints, scenario: Scenario, secure: Path | None, reason
                 done = _tell(stop.result(), whose) and done
             except AbreastError as error:
                 nobody = stop is lab and not somebody
-                note(f"abreast stop: {f'nobody is at {usual.describe()}' if nobody else f'{whose}{error}'}")
+                told = f"no other lab is at {usual.describe()}" if nobody else f"{whose}{error}"
+                note(f"abreast stop: {told}")
                 done = done and nobody
     for run in runs:
         if needs_keys(run, secure):

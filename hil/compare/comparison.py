@@ -9,7 +9,7 @@ from typing import Any
 from hil.compare.change import Change, change_of
 from hil.compare.conditions import Failure
 from hil.compare.differences import Differences, differences_of
-from hil.compare.group import RUNS, Group, Spread
+from hil.compare.group import RUNS, STOPPED, Group, Spread
 from hil.compare.metrics import HEADLINES, goal_of, in_order
 from hil.compare.verdict import Verdict, verdict_on
 from hil.judge.dotted_figures import bare
@@ -95,6 +95,10 @@ _NOISE = ("mocap.", "robot.", "leader.", "run.duration_s", "duration_s")
 def _notes(groups: Sequence[Group], differences: Differences) -> list[str]:
     notes = [note for group in groups for note in group.notes]
     notes += _gone(groups)
+    for group in groups:
+        if stopped := sum(STOPPED in sample.facts for sample in group.samples):
+            count = f"{stopped} of {len(group.samples)} runs"
+            notes.append(f"of {group.label} {count} ended by a stop: what is judged of it may be its start")
     if len({tuple(sample.runs for sample in group.samples) for group in groups if group.kind != RUNS}) > 1:
         notes.append(
             "they did not do as many runs of each cell: counts are compared as shares of these, and errors "

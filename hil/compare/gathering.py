@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from hil.compare.group import RUNS, SWEEP, Group, Sample
+from hil.compare.group import RUNS, STOPPED, SWEEP, Group, Sample
 from hil.compare.metrics import metrics_of
 from hil.errors import AbreastError, UsageError
 from hil.extensions.reference import is_reference, short
@@ -223,6 +223,7 @@ def _facts(log: Path | None, summary: Mapping[str, Any]) -> dict[str, str]:
         "version": told.get("version"),
         "estimator.kind": summary.get("estimator"),
         "controller.law": law_name(summary["law"]) if "law" in summary else None,
+        STOPPED: (summary.get("stopped_by") or {}).get("reason"),
     }
     if isinstance(law := summary.get("law"), Mapping):
         others["controller.law (digest)"] = law.get("digest")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,9 @@ from typing import Any
 import numpy as np
 
 RUNS, SWEEP = "runs", "sweep"
+STOPPED = "stopped before its time"
+"""The fact of a run that somebody stopped, and why."""
+
 _COUNTS = ("diverged", "untracked", "samples", "law_failed", "bounds.violations.")
 
 
@@ -88,6 +91,10 @@ class Group:
         """Spread of a metric, None where no sample knows it."""
         values = self.values(name)
         return Spread.of(values) if values else None
+
+    def at_noise(self, level: float) -> Group:
+        """Those of its cells that have a level of position noise [m]."""
+        return replace(self, samples=tuple(each for each in self.samples if each.noise == level))
 
     def adds_up(self, name: str) -> bool:
         """Whether a metric is a count of a sweep's cells, whose sum is what matters."""

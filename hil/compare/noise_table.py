@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from hil.compare.change import change_of
 from hil.compare.comparison import Comparison
@@ -35,10 +34,7 @@ def noise_rows(comparison: Comparison) -> list[list[str]]:
 
 
 def _row(title: str, name: str, level: float, groups: Sequence[Group]) -> list[str]:
-    first, *others = (
-        replace(group, samples=tuple(each for each in group.samples if each.noise == level))
-        for group in groups
-    )
+    first, *others = (group.at_noise(level) for group in groups)
     cells = [title, spread_text(name, first.spread(name))]
     for group in others:
         change = change_of(name, first, group)

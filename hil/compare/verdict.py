@@ -49,7 +49,19 @@ def verdict_on(groups: Sequence[Group]) -> Verdict:
     reasons = "; ".join(filter(None, [because, _reasons(worse, better, headlines)]))
     changes = [change for _, change in _changes(worse, better, headlines)]
     trust = _trust(worse, better, changes, by_errors=decided is None)
+    trust += _where_worse(worse, better, headlines) if decided is None else ""
     return Verdict(better.label, f"{better.label} was {which}: {reasons}{trust}.")
+
+
+def _where_worse(worse: Group, better: Group, headlines: Headlines) -> str:
+    """At which noise the better sweep is the worse one, by what decides."""
+    levels = sorted({each.noise for each in better.samples if each.noise is not None})
+    lost = [
+        f"{1e3 * level:.3g}"
+        for level in levels
+        if (_score(worse.at_noise(level), better.at_noise(level), headlines) or 0.0) > _NEGLIGIBLE
+    ]
+    return f"; but worse at {', '.join(lost)} mm of position noise" if lost else ""
 
 
 def _best(
@@ -111,6 +123,8 @@ def _told(name: str, worse: Group, better: Group, change: Change) -> str:
     percent = f"{100.0 * ((change.ratio or 0.0) - 1.0):+.0f} %"
     if change.pairs and not math.isclose(new, old * (change.ratio or 0.0), rel_tol=0.1):
         percent += " in the median of the pairs"
+    if better.kind == SWEEP and len(better.samples) > 1:
+        percent += ", medians of the cells"
     values = f"{shown(name, new)} instead of {shown(name, old)}{unit}"
     return f"{HEADLINES[bare(name)]}{whose} {values} ({percent})"
 

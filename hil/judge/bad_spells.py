@@ -250,5 +250,5 @@ def _worst(watched: Watched, from_s: float, to_s: float) -> Mapping[str, Mapping
         if name in errors:
             size = np.abs(errors[name])
             row = int(np.nanargmax(size))
-            worst[name] = {"error": float(size[row]), "at_s": float(at_s[told][row])}
+            worst[name] = {"error": float(size[row]), "at_s": round(float(at_s[told][row]), 6)}
     return worst

@@ -43,7 +43,7 @@ def spell_line(spell: Mapping[str, Any]) -> str:
 def spell_told(spell: Mapping[str, Any]) -> str:
     """What was bad in a spell, and how far off the estimates were."""
     worst = [_off(name, each) for name, each in sorted(spell.get("worst", {}).items())]
-    off = [f"off by up to {', '.join(worst)}"] if worst else []
+    off = [f"off while tracking by up to {', '.join(worst)}"] if worst else []
     return "; ".join([*spell["causes"], *off])
 
 

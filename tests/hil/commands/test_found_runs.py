@@ -120,7 +120,7 @@ def test_a_stop_without_a_place_stops_all_runs_of_this_machine_at_once(ran: Ran,
     done = ran("stop", "enough")
     assert time.monotonic() - begun < 10.0
     assert (done.code, done.err.count("\n")) == (0, 1), done.err
-    assert "nobody is at tcp/127.0.0.1" in done.err
+    assert "no other lab is at tcp/127.0.0.1" in done.err
     assert "a/scenario.toml: a1, a2 told to stand (enough): a1 stands (odometry" in done.out
     assert "b/scenario.toml: b1, b2 told to stand (enough): b1 stands (odometry" in done.out
     assert [stops(wire) for wire in wires] == [{"enough"}, {"enough"}]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from hil.compare.comparison import compared
 from hil.compare.comparison_text import comparison_text
-from hil.compare.group import RUNS, SWEEP, Group, Sample
+from hil.compare.group import RUNS, STOPPED, SWEEP, Group, Sample
 from hil.compare.noise_table import noise_rows
 from hil.compare.verdict import verdict_on
 
@@ -78,3 +79,20 @@ def test_sweeps_are_told_level_by_level() -> None:
     ]
     assert "at position noise" in comparison_text(comparison, rows, "with --json")
     assert noise_rows(compared([run("A", 1.0, 1.0), run("B", 1.0, 1.0)])) == []
+
+
+def test_at_which_noise_the_better_sweep_is_the_worse_is_said() -> None:
+    first = swept("A", "independent", 0.02, 0.02, 0.02, 0.02)
+    verdict = verdict_on([first, swept("B", "faded", 0.002, 0.022, 0.002, 0.022)])
+    assert verdict.best == "B"
+    assert "medians of the cells" in verdict.text
+    assert verdict.text.endswith("; but worse at 5 mm of position noise.")
+
+
+def test_of_a_run_that_was_stopped_it_is_said() -> None:
+    first, other = run("A", 1e-3, 1e-2), run("B", 2e-3, 1e-2)
+    cut = Group("B", Path("B"), RUNS, (replace(other.samples[0], facts={STOPPED: "too near"}),), {})
+    text = comparison_text(compared([first, cut]))
+    assert "! of B 1 of 1 runs ended by a stop" in text
+    assert "too near" in text
+    assert "ended by a stop" not in comparison_text(compared([first, other]))

@@ -78,7 +78,7 @@ def test_what_a_spell_says_is_not_said_again_without_its_time(dropout: Log) -> N
     ]
     assert len(said) == 1
     assert said[0].startswith("4.0 to 6.1 s: no frame for 2.0 s (240 lost); coasting")
-    assert "off by up to alpha1 " in said[0]
+    assert "off while tracking by up to alpha1 " in said[0]
 
 
 @pytest.mark.parametrize("name", ["plain-ekf", "sides-imm"])
