@@ -19,8 +19,6 @@ from hil.scenario.schema import Scenario
 from hil.wire import topics
 from hil.wire.key_layout import layout_of
 from hil.wire.lab_robots import robots_of
-from hil.wire.role_keys import RoleKeys
-from hil.wire.roles import ROLES
 from hil.wire.session import Endpoints
 
 USUAL = "turtlebot3"
@@ -72,8 +70,7 @@ def endpoints_of_run(run: RunHere, secure: Path | None, role: str) -> Endpoints:
     """Where a run is joined, by keys where it has some."""
     if not run.endpoint:
         return Endpoints(config_file=Path(run.zenoh_config))
-    keys = next(RoleKeys(secure, each) for each in ROLES if each == role) if secure and run.has_keys else None
-    return Endpoints(connect=run.endpoint, keys=keys)
+    return endpoints_of(run.endpoint, None, None, secure if run.has_keys else None, role)
 
 
 def scenario_was_given() -> bool:

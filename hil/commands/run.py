@@ -288,6 +288,7 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> Outcome:
     from hil.live.finding_lines import FindingLines, WaitingLines
     from hil.live.run import run_live
     from hil.live.run_monitor import Snapshot
+    from hil.log.resolved_scenario import RESOLVED
     from hil.wire.session import Endpoints, reserved_endpoint
 
     ending = Ending()
@@ -312,7 +313,7 @@ def _live(scenario: Scenario, log_path: Path, live: _Live) -> Outcome:
         aside = Console(file=sys.stderr, quiet=console.is_terminal)
         waiting = WaitingLines(lambda line: aside.print(Text(line), soft_wrap=True))
 
-        resolved = log_path.parent / "scenario.toml"
+        resolved = log_path.parent / RESOLVED
         untold = [how_to_stop(endpoints.joining, scenario, resolved)]
 
         def show(snapshot: Snapshot, elapsed: float | None) -> None:

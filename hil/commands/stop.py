@@ -101,8 +101,8 @@ def _stop_here(usual: Endpoints, scenario: Scenario, secure: Path | None, reason
             whose = stops[stop]
             try:
                 done = _tell(stop.result(), whose) and done
-            except AbreastError as error:
-                nobody = stop is lab and not somebody
+            except Exception as error:  # whatever comes of one, what came of the others is told
+                nobody = stop is lab and not somebody and isinstance(error, NoRouterError)
                 told = f"no other lab is at {usual.describe()}" if nobody else f"{whose}{error}"
                 note(f"abreast stop: {told}")
                 done = done and nobody

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,10 +13,10 @@ from formation.records import dtype_of
 from hil.judge.columns import true_states
 from hil.judge.run_data import RunData, Span, evaluation_span, run_data_of_kept
 from hil.judge.true_states import Stamps, TrueStates
-from hil.live.reported_number import reported_number
 from hil.log.cdr_columns import Array, Lists, columns_of, fields_of
 from hil.log.reader import Log, Record
 from hil.nodes.findings import Findings
+from hil.nodes.troubles import troubles_in
 from hil.replay.kept import Kept, KeptReplay
 from hil.replay.kept_rows import EstimateRow, TruthRow
 from hil.replay.node_reports import LastReports
@@ -27,7 +27,6 @@ from hil.wire.messages import MalformedPayloadError, encode, known_types, typena
 from hil.wire.topics import link_topics
 
 _AT_ONCE = 1 << 14
-_REFUSED = "refused."
 DIAGONAL = 6
 """One in so many entries of an estimate's covariance is a variance."""
 
@@ -192,28 +191,20 @@ class _Refusals:
 
     def __init__(self, log: Log, link: Link) -> None:
         self._log = log
-        self._name = f"abreast/{link.node_name('estimator')}"
+        self._name = link.node_name("estimator")
         self._heard: list[tuple[int, float, str]] = []
 
     def hear(self, record: Record) -> None:
         if self._name.encode() not in record.payload:
             return
-        for status in self._statuses(record):
-            told = {
-                each.key.removeprefix(_REFUSED): each.value for each in status.values if _REFUSED in each.key
-            }
-            numbers = {cause: reported_number(text) for cause, text in told.items()}
-            counts = {cause: number for cause, number in numbers.items() if number is not None}
-            causes = ", ".join(f"{cause} {count}" for cause, count in counts.items())
-            self._heard.append((record.log_ns, float(sum(counts.values())), causes))
-
-    def _statuses(self, record: Record) -> Iterator[msg.DiagnosticStatus]:
         try:
             report = self._log.decode(record)
+            told = troubles_in(report) if isinstance(report, msg.DiagnosticArray) else {}
         except MalformedPayloadError:
             return
-        if isinstance(report, msg.DiagnosticArray):
-            yield from (each for each in report.status if each.name == self._name)
+        if (trouble := told.get(self._name)) is not None:
+            causes = ", ".join(f"{cause} {count}" for cause, count in trouble.refused.items())
+            self._heard.append((record.log_ns, float(sum(trouble.refused.values())), causes))
 
     def done(self) -> Refusals | None:
         if not self._heard:

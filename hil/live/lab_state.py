@@ -9,9 +9,9 @@ from typing import Any
 
 from formation.pose import STANDSTILL, Motion
 from hil.guard.report import GUARDS
-from hil.live.reported_number import reported_number
 from hil.nodes.at_rest import own_motion
 from hil.nodes.findings import findings_in, findings_json
+from hil.nodes.reported_number import reported_number
 from hil.scenario.schema import Scenario
 from hil.wire import message_types as msg
 from hil.wire import topics

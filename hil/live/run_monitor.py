@@ -13,10 +13,10 @@ import zenoh
 from estimation.tracking.tracker import Status
 from formation.pose import Motion
 from hil.guard.report import GUARDS
-from hil.live.reported_number import reported_number
 from hil.nodes.at_rest import stands
 from hil.nodes.findings import Findings, findings_in
 from hil.nodes.leader_driver import stop_reason
+from hil.nodes.reported_number import reported_number
 from hil.scenario.links import STARTERS
 from hil.wire import message_types as msg
 from hil.wire import topics

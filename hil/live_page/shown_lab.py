@@ -10,12 +10,12 @@ from formation.pose import Motion, Pose
 from formation.station import Side, Station
 from hil.live.guards_heard import GuardsHeard
 from hil.live.lab_state import LabState
-from hil.live.reported_number import reported_number
 from hil.live_page.arrivals import Arrivals
 from hil.live_page.orbit import Orbit, is_due
 from hil.live_page.shown_estimate import shown_estimate
 from hil.live_page.shown_numbers import clipped, shown
 from hil.nodes.at_rest import stands
+from hil.nodes.reported_number import reported_number
 from hil.scenario.links import STARTERS, links_of
 from hil.scenario.parts import may_change_sides
 from hil.scenario.schema import Scenario

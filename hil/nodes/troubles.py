@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from hil.nodes.findings import findings_in
+from hil.nodes.reported_number import reported_number
 from hil.wire.message_types import DiagnosticArray
 from hil.wire.messages import to_ns
 
 REFUSED = "refused."
 """What the keys of counts of refused inputs begin with."""
-_MOST_DIGITS = 18
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,9 +30,9 @@ def troubles_in(report: DiagnosticArray) -> dict[str, Trouble]:
         name: Trouble(
             at_ns,
             {
-                entry.key.removeprefix(REFUSED): int(entry.value)
+                entry.key.removeprefix(REFUSED): count
                 for entry in status.values
-                if entry.key.startswith(REFUSED) and _is_count(entry.value)
+                if entry.key.startswith(REFUSED) and (count := reported_number(entry.value)) is not None
             },
             frozenset(found[name]),
         )
@@ -44,7 +44,3 @@ def troubles_in(report: DiagnosticArray) -> dict[str, Trouble]:
 def troubles_of(reports: Iterable[DiagnosticArray], node: str) -> list[Trouble]:
     """Troubles of a node in the order of its reports."""
     return [told[node] for told in map(troubles_in, reports) if node in told]
-
-
-def _is_count(text: str) -> bool:
-    return text.isdecimal() and len(text) <= _MOST_DIGITS

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 
-from formation.pose import STANDSTILL, Pose
 from hil.command_line import main
-from hil.commands import wire_options
+from hil.commands import stop, wire_options
 from hil.commands.found_runs import how_to_stop
-from hil.emulator.lab_messages import odometry_message
-from hil.live.runs_here import found_here, own_folder
+from hil.live.runs_here import RunHere, found_here, own_folder
+from hil.live.stopping import Stopped
 from hil.scenario.files import load_scenario, scenario_text
 from hil.scenario.guarded import with_guards
 from hil.wire.message_types import String
-from hil.wire.messages import decode_as, encode
+from hil.wire.messages import decode_as
 from hil.wire.pubsub import Wire
 from hil.wire.session import Endpoints, reserved_endpoint
 from tests.routers import router
+from tests.said_again import again, odometry
 
 
 class Said(NamedTuple):
@@ -63,26 +62,6 @@ def usual(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[str]:
         yield endpoint
 
 
-@contextmanager
-def talking(wire: Wire, robots: tuple[str, ...]) -> Iterator[None]:
-    """Robots that say that they stand."""
-    over = threading.Event()
-    still = {robot: encode(odometry_message(5, robot, Pose(0.0, 0.0, 0.0), STANDSTILL)) for robot in robots}
-
-    def say() -> None:
-        while not over.wait(0.02):
-            for robot, payload in still.items():
-                wire.publish(f"{robot}/odom", payload)
-
-    saying = threading.Thread(target=say)
-    saying.start()
-    try:
-        yield
-    finally:
-        over.set()
-        saying.join()
-
-
 Begin = Callable[[str], tuple[str, Wire]]
 
 
@@ -100,7 +79,7 @@ def begin(tmp_path: Path) -> Iterator[Begin]:
             path.write_text(scenario_text(load_scenario("turtlebot3", names)), encoding="utf-8")
             held.enter_context(found_here(Endpoints(connect=endpoint), path, own_folder()))
             wire.subscribe(["stop"])
-            held.enter_context(talking(wire, robots))
+            held.enter_context(again(wire, *map(odometry, robots)))
             return endpoint, wire
 
         yield begun
@@ -126,11 +105,30 @@ def test_a_stop_without_a_place_stops_all_runs_of_this_machine_at_once(ran: Ran,
     assert [stops(wire) for wire in wires] == [{"enough"}, {"enough"}]
 
 
+def test_whatever_comes_of_one_stop_what_came_of_the_others_is_told(
+    ran: Ran, begin: Begin, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("a", "b"):
+        begin(name)
+    stopped_run = stop._stopped_run
+
+    def fails(run: RunHere, *given: Any) -> Stopped:
+        if "a/scenario.toml" in run.scenario:
+            raise RuntimeError("the wire broke")
+        return stopped_run(run, *given)
+
+    monkeypatch.setattr(stop, "_stopped_run", fails)
+    done = ran("stop", "enough")
+    assert done.code == 1
+    assert "a/scenario.toml: the wire broke" in done.err
+    assert "b/scenario.toml: b1, b2 told to stand (enough): b1 stands" in done.out
+
+
 def test_a_stop_without_a_place_stops_the_usual_lab_as_well(
     ran: Ran, begin: Begin, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _, wire = begin("a")
-    with router() as (endpoint, lab), talking(lab, ("leader", "follower")):
+    with router() as (endpoint, lab), again(lab, odometry("leader"), odometry("follower")):
         monkeypatch.setattr(wire_options, "DEFAULT_ENDPOINT", endpoint)
         lab.subscribe(["stop"])
         done = ran("stop")

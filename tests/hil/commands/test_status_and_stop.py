@@ -3,14 +3,11 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
 
 import pytest
 
-from formation.pose import STANDSTILL, Motion, Pose
-from hil.emulator.lab_messages import odometry_message
+from formation.pose import Motion
 from hil.nodes.node import diagnostics
 from hil.wire.drive_message import drive_message
 from hil.wire.message_types import String, TwistStamped
@@ -18,35 +15,13 @@ from hil.wire.messages import decode_as, encode
 from hil.wire.pubsub import Wire
 from hil.wire.session import reserved_endpoint
 from tests.routers import router
+from tests.said_again import again, odometry
 
 
 @pytest.fixture
 def lab() -> Iterator[tuple[str, Wire]]:
     with router() as found:
         yield found
-
-
-@contextmanager
-def again(wire: Wire, *said: tuple[str, bytes]) -> Iterator[None]:
-    """Somebody who says all of this 50 times a second."""
-    over = threading.Event()
-
-    def say() -> None:
-        while not over.wait(0.02):
-            for topic, payload in said:
-                wire.publish(topic, payload)
-
-    saying = threading.Thread(target=say)
-    saying.start()
-    try:
-        yield
-    finally:
-        over.set()
-        saying.join()
-
-
-def odometry(robot: str, moves: Motion = STANDSTILL) -> tuple[str, bytes]:
-    return f"{robot}/odom", encode(odometry_message(5, robot, Pose(0.0, 0.0, 0.0), moves))
 
 
 def drive(v: float, *, stamped: bool = True) -> bytes:
