@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from estimation.bounds.guarantees import leader_acceleration
-from estimation.bounds.window_difference import best_difference
+from estimation.bounds.window_difference import WindowDifference, best_difference, best_line
 from formation.spacing import Spacing
 from formation.speed_range import SpeedRange
 from formation.station import Side
@@ -48,3 +48,8 @@ class Assumptions:
     def velocity_error(self) -> float:
         """Guaranteed error W of the leader's velocity [m/s], by the best difference over a window."""
         return best_difference(self.eps, self.acceleration, self.step).error
+
+    @property
+    def line(self) -> WindowDifference:
+        """The best straight line through positions of independent noise, by eps = 5 of its deviations."""
+        return best_line(self.eps, self.acceleration, self.step)

@@ -4,7 +4,7 @@ Every claim says what it rests on, and where nothing can be claimed, why. The ch
 and a bound A of the leader's acceleration give the error W of its velocity, in any direction, that the best
 difference over a window guarantees; W gives the bounds on rates, on v1 and alpha1, and on h; the rate of
 alpha2 its ultimate bound; the leader's turn rate the invariant set of (rho, alpha1), without and with the
-errors of h.
+errors of h, and with alpha2, where noise may lean to one side for ever and where it averages out.
 """
 
 from __future__ import annotations
@@ -21,9 +21,11 @@ from estimation.bounds.error_bounds import Perceived, RateErrors, paper_h, sound
 from estimation.bounds.formation_claims import (
     Claim,
     extremes,
+    formation_by_line,
     formation_in,
     formation_with_alpha2,
     k_u_star,
+    wrong_velocity,
 )
 from estimation.bounds.guarantees import alpha2_ultimate, guaranteed_rate
 from formation.angles import FloatArray
@@ -58,6 +60,7 @@ class Certificate:
     formation_any_speed: Claim
     formation_with_errors: Claim
     formation_with_alpha2: Claim
+    formation_independent_noise: Claim
     k_u_star: Claim
 
     def claims(self) -> dict[str, Claim]:
@@ -86,6 +89,7 @@ def certify(given: Assumptions) -> Certificate:
         formation_any_speed=_formation_any_speed(given, system),
         formation_with_errors=_formation_with_errors(given, velocity_error, system, held),
         formation_with_alpha2=formation_with_alpha2(given, velocity_error, system),
+        formation_independent_noise=formation_by_line(given, system),
         k_u_star=k_u_star(given),
     )
 
@@ -224,9 +228,7 @@ def _formation_with_errors(
     v1, spacing = system.speeds.lowest, given.spacing
     model = ErrorModel(given.mu1, spacing.rho_0, spacing.mu_rho, v1, given.k_u, velocity_error)
     found = error_set(model)
-    besides = (
-        f"the believed velocity of the leader off by at most W = {velocity_error:.4g} m/s, in any direction"
-    )
+    besides = wrong_velocity(velocity_error)
     if found is None:
         why = (
             f"the worst steering within {given.k_u:g} rad/s with the worst belief within "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -71,12 +71,27 @@ def _why_not_held(given: Assumptions, system: Disturbed) -> str:
     return f"the worst steering within {system.D:.3g} rad/s carries alpha1 past its saddle"
 
 
+def wrong_velocity(error: float) -> str:
+    """That the leader's velocity is believed wrong by up to W = ``error`` [m/s], in words."""
+    return f"the believed velocity of the leader off by at most W = {error:.4g} m/s, in any direction"
+
+
+def formation_by_line(given: Assumptions, system: Disturbed) -> Claim:
+    """The set with alpha2 for what a straight line through positions of independent noise errs by."""
+    samples, error = given.line
+    claim = formation_with_alpha2(given, error, system)
+    averaged = (
+        "W: noise independent from frame to frame, so that it averages out in the straight line through the "
+        f"positions of the last {samples * given.step:.3g} s, whose slope errs by at most 5 of its standard "
+        "deviations by noise; bodies that rock as they drive are noisier than that"
+    )
+    return replace(claim, assumes=(*claim.assumes, averaged))
+
+
 def formation_with_alpha2(given: Assumptions, velocity_error: float, system: Disturbed) -> Claim:
     """The set of rho, alpha1 and alpha2 together, all moved by one wrong velocity; at constant speed only."""
     speeds, spacing = system.speeds, given.spacing
-    besides = (
-        f"the believed velocity of the leader off by at most W = {velocity_error:.4g} m/s, in any direction"
-    )
+    besides = wrong_velocity(velocity_error)
     plane = formation_in(given, system, None, besides).assumes
     assumes = tuple(WHOLE if assumed == MANIFOLD else assumed for assumed in plane)
     if unknown := given.unproved or given.unknown_steering:

@@ -126,6 +126,7 @@ CLAIMS = {
     "formation_any_speed": "Formation at any speed of the leader",
     "formation_with_errors": "Formation with wrong estimates",
     "formation_with_alpha2": "Formation with wrong estimates and α₂ moving",
+    "formation_independent_noise": "The same where noise averages out",
     "k_u_star": "Turn rate up to which Prop. 3 holds, k_u*",
 }
 """Claims of a certificate by their keys."""

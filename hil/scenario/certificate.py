@@ -116,6 +116,7 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
 
 
 _SET = "rho {rho_min:.4f} to {rho_max:.4f} m, alpha1 {alpha1_min:.4f} to {alpha1_max:.4f} rad"
+_JOINT = _SET + ", alpha2 within {alpha2_within:.4f} rad"
 _TITLES = {
     "rates": ("rates", "M_rho {M_rho:.4f} m/s, M_alpha2 {M_alpha2:.4f} rad/s"),
     "estimates": ("estimates", "v1 within {M_v1:.4f} m/s"),
@@ -124,7 +125,8 @@ _TITLES = {
     "formation": ("formation", ""),
     "formation_any_speed": ("  at any speed", ""),
     "formation_with_errors": ("  with wrong estimates", ""),
-    "formation_with_alpha2": ("  and alpha2 moving", _SET + ", alpha2 within {alpha2_within:.4f} rad"),
+    "formation_with_alpha2": ("  and alpha2 moving", _JOINT),
+    "formation_independent_noise": ("  by independent noise", _JOINT),
     "k_u_star": ("k_u* of Prop. 3", "between {lower:.4f} and {upper:.4f} rad/s"),
 }
 _PRINTED = 1e4

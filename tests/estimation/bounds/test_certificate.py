@@ -11,6 +11,7 @@ import pytest
 from estimation.bounds.assumptions import Assumptions
 from estimation.bounds.bound_check import SpeedInputs, h_of
 from estimation.bounds.certificate import certify
+from estimation.bounds.window_difference import best_line
 from formation.error_set_kernels import ErrorModel
 from formation.invariant_set import Disturbed, InvariantSet, invariant_set
 from formation.joint_set import Aside, joint_set
@@ -272,6 +273,20 @@ def test_the_set_with_alpha2_is_that_of_its_model_and_wider_than_without() -> No
     assert left.figures == mirrored(figures)
 
 
+def test_where_noise_averages_out_the_robot_experiment_keeps_all_three() -> None:
+    """What no set is known for if noise leans to one side for ever."""
+    found = certify(TURTLEBOT3)
+    figures = found.formation_independent_noise.figures
+    joint = joint_set(ErrorModel(1.5, 0.2, 20.0, 0.08, 0.7, figures["W"]), Aside(2.0))
+    assert joint is not None
+    assert (figures["rho_min"], figures["alpha2_within"]) == (joint.rho_min, joint.alpha2_within)
+    assert figures["W"] == best_line(1.5e-3, 0.07, 1.0 / 120.0).error < 0.6 * found.velocity_error
+    assert "independent" in found.formation_independent_noise.assumes[-1]
+    exact = found.formation.figures
+    assert 0.12 < figures["rho_min"] < exact["rho_min"] < exact["rho_max"] < figures["rho_max"] < 0.4
+    assert certify(replace(TURTLEBOT3, eps=5e-3)).formation_independent_noise.figures == {}
+
+
 def test_any_speed_means_every_speed_that_the_leader_may_drive() -> None:
     given = replace(TURTLEBOT3, k_u=0.3)
     anywhere = certify(replace(given, speeds=SpeedRange(given.v_eps, given.k_v)))
@@ -287,7 +302,14 @@ def test_the_margin_of_steering_is_that_of_a_constant_speed() -> None:
 
 def test_where_the_theory_does_not_speak_nothing_is_said_of_the_formation() -> None:
     found = certify(replace(QUIET, unproved="a station not abreast"))
-    names = ("formation", "formation_any_speed", "formation_with_errors", "formation_with_alpha2", "k_u_star")
+    names = (
+        "formation",
+        "formation_any_speed",
+        "formation_with_errors",
+        "formation_with_alpha2",
+        "formation_independent_noise",
+        "k_u_star",
+    )
     for name in names:
         assert (found.claims()[name].figures, found.claims()[name].why) == ({}, "a station not abreast")
     assert list(found.claims()) == ["rates", "estimates", "h", "alpha2_ultimate", *names]

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from estimation.bounds.guarantees import guaranteed_rate, guaranteed_window
-from estimation.bounds.window_difference import best_difference
+from estimation.bounds.window_difference import best_difference, best_line
 
 noises, accelerations = st.floats(1e-4, 0.1), st.floats(0.01, 5.0)
 
@@ -81,6 +81,35 @@ def least_error(eps: float, acceleration: float, step: float, count: int) -> flo
     return float(solution.fun or 0.0) * eps / window
 
 
+def line_error(eps: float, acceleration: float, step: float, samples: int) -> float:
+    """What noise and the worst acceleration make of a fitted slope, by its own weights."""
+    t = step * np.arange(-samples, 1.0)
+    weights = np.linalg.pinv(np.column_stack([np.ones_like(t), t]))[1]
+    fine = np.linspace(t[0], 0.0, 40 * samples + 1)
+    since = 0.5 * (fine[1:] + fine[:-1])
+    # A push for a moment at s moves all that is measured later, which is told of as of the last sample.
+    kernel = np.maximum(t[np.newaxis, :] - since[:, np.newaxis], 0.0) @ weights - 1.0
+    return float(eps * np.linalg.norm(weights) + acceleration * np.abs(kernel).sum() * (fine[1] - fine[0]))
+
+
+@settings(deadline=None)
+@given(eps=noises, acceleration=accelerations, samples=st.floats(0.4, 40.0))
+def test_a_line_errs_by_what_its_weights_make_of_noise_and_acceleration(
+    eps: float, acceleration: float, samples: float
+) -> None:
+    step = float(guaranteed_window(eps, acceleration)) / samples
+    found = best_line(eps, acceleration, step)
+    assert found.error == pytest.approx(line_error(eps, acceleration, step, found.samples), rel=1e-3)
+    for other in {max(1, found.samples - 1), found.samples + 1, 2 * found.samples}:
+        assert line_error(eps, acceleration, step, other) > found.error * (1.0 - 1e-3)
+
+
+def test_independent_noise_averages_out_the_more_often_one_looks() -> None:
+    seldom, often = best_line(1.5e-3, 0.07, 1.0 / 120.0), best_line(1.5e-3, 0.07, 1.0 / 480.0)
+    assert often.error == pytest.approx(seldom.error * 4.0**-0.2, rel=0.02)
+    assert best_difference(1.5e-3, 0.07, 1.0 / 480.0).error > 1.7 * seldom.error
+
+
 def test_sparse_samples_cost_what_a_difference_of_two_costs() -> None:
     """With samples so far apart that older ones say nothing, the last two are all there is."""
     assert best_difference(1e-4, 1.0, 0.5) == (1, 2e-4 / 0.5 + 0.25)
@@ -90,5 +119,6 @@ def test_sparse_samples_cost_what_a_difference_of_two_costs() -> None:
     "wrong", [(0.0, 1.0, 0.1), (1.0, -1.0, 0.1), (1.0, 1.0, 0.0), (float("nan"), 1.0, 0.1)]
 )
 def test_nothing_can_be_guaranteed_without_bounds(wrong: tuple[float, float, float]) -> None:
-    with pytest.raises(ValueError, match="expected positive numbers"):
-        best_difference(*wrong)
+    for velocity in (best_difference, best_line):
+        with pytest.raises(ValueError, match="expected positive numbers"):
+            velocity(*wrong)
