@@ -121,6 +121,10 @@ class Interpreted:
         """See :meth:`Estimator.start`."""
         return _remembering(self.estimator.start(measurement))
 
+    def begun_moving(self, measurement: Measurement, ahead: Gaussian, dt: float) -> Gaussian:
+        """As :meth:`start`; see :meth:`~estimation.filters.filter.Filter.begun_moving`."""
+        return self.start(measurement)
+
     def predict(self, belief: Gaussian, dt: float, follower: FollowerMotion) -> Gaussian:
         """See :meth:`Estimator.predict`."""
         return _remembering(self.estimator.predict(whole_of(belief), dt, follower))

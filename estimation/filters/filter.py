@@ -78,6 +78,18 @@ class Filter(NamedTuple):
         return started(measurement.x, measurement.y, measurement.spread, self.limits)
 
     @kernel
+    def begun_moving(self, measurement: Measurement, ahead: Gaussian, dt: float) -> Gaussian:
+        """Belief from a measurement and the one dt [s] before, of which ``ahead`` is where it was to lead.
+
+        As uncertain as from the first alone, but moving as between the two: to whoever is faster than k_v.
+        """
+        begun = self.start(measurement)
+        if self.kind == DIFFERENCE:
+            return begun
+        vx, vy = ahead.vx + (measurement.x - ahead.x) / dt, ahead.vy + (measurement.y - ahead.y) / dt
+        return begun._replace(vx=vx, vy=vy)
+
+    @kernel
     def predict(self, belief: Gaussian, dt: float, follower: FollowerMotion) -> Gaussian:
         """Belief after dt [s], the follower having moved as given."""
         noise = self.noise if self.in_world else standing_noise(belief, self.noise)

@@ -138,7 +138,7 @@ def own_followed(last: OwnPoint, due: OwnPoint, noise: OwnNoise) -> OwnPoint:
     if found.nis > _POSE_GATE:
         used_ns, rejected = last.used_ns, last.rejected + 1
         if rejected >= _REACQUIRE:
-            return due._replace(state=due.state._replace(v=state.v, u=state.u))
+            return _begun_anew(last, due, dt)
     else:
         state, spread = found.state, found.spread
     if due.has_odometry:
@@ -147,6 +147,18 @@ def own_followed(last: OwnPoint, due: OwnPoint, noise: OwnNoise) -> OwnPoint:
         if by_odometry.nis <= _MOTION_GATE:
             state, spread = by_odometry.state, by_odometry.spread
     return due._replace(state=state, spread=spread, used_ns=used_ns, rejected=rejected)
+
+
+@kernel
+def _begun_anew(last: OwnPoint, due: OwnPoint, dt: float) -> OwnPoint:
+    """Filter at the newest of poses that do not fit it, moving as from the last of them to this one.
+
+    What it took the motion for may be what does not fit: a robot that drives faster than it is told to.
+    """
+    theta, turned = last.pose.theta, wrapped(due.pose.theta - last.pose.theta)
+    c, s = math.cos(theta + 0.5 * turned), math.sin(theta + 0.5 * turned)
+    v = (c * (due.pose.x - last.pose.x) + s * (due.pose.y - last.pose.y)) / dt
+    return due._replace(state=due.state._replace(v=v, u=turned / dt))
 
 
 @kernel

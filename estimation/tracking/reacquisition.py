@@ -22,9 +22,12 @@ def joined(
 ) -> TentativeTrack:
     """Tentative track that a rejected measurement has joined, or a new one if the two do not agree.
 
-    They agree if leader and follower are within the gate of where the tentative track has them.
+    They agree if leader and follower are within the gate of where the tentative track has them. If they do
+    not, the new one moves as from the last measurement to this: who is faster than any leader was said to be
+    agrees with itself from the third on.
     """
     capture_ns, motion, follower = measurement.capture_ns, measurement.motion, measurement.seen.follower
+    begun = estimator.start(measurement)
     if tentative.frames > 0:
         dt = (capture_ns - tentative.capture_ns) * _NS
         own = measurement.way if measurement.has_way else mean_motion(tentative.motion, motion)
@@ -35,7 +38,8 @@ def joined(
             return TentativeTrack(
                 stepped.belief, capture_ns, motion, tentative.frames + 1, measurement.framed, follower
             )
-    return TentativeTrack(estimator.start(measurement), capture_ns, motion, 1, measurement.framed, follower)
+        begun = estimator.begun_moving(measurement, stepped.belief, dt)
+    return TentativeTrack(begun, capture_ns, motion, 1, measurement.framed, follower)
 
 
 @kernel

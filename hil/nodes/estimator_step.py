@@ -143,10 +143,10 @@ def _take_frame(knowns: Rows[Known], memory: Memory, rules: Rules, capture_ns: i
     taken = take(knowns, memory, rules, measured(rules, capture_ns, seen, motion))
     if rules.source == ODOMETRY:
         return taken
-    # A follower's pose that is not believed must not move its own track either.
-    believed = taken.cause == BELIEVED or taken.cause == LEADER_OFF
-    # Odometry that lies must not keep its judge from the poses that tell so: the track has a gate of its own.
-    believed = believed or (rules.source == AUTO and taken.cause == FOLLOWER_OFF)
+    # Frames that are plainly wrong must not move the follower's own track. One that is not where its motion
+    # took it may be right, and the motion wrong: odometry lies, or the track, which has a gate of its own, has
+    # to begin anew.
+    believed = taken.cause == BELIEVED or taken.cause == LEADER_OFF or taken.cause == FOLLOWER_OFF
     if taken.verdict == DUPLICATE or taken.verdict == LATE or not believed:
         return taken
     own = folded(memory.own, known.own, due, rules.own_noise, rules.settings.window)

@@ -114,6 +114,22 @@ def test_without_odometry_the_own_track_tells_the_motion(rows: dict[str, Any]) -
     assert float(np.sqrt(np.mean((alone.alpha1[good] + 0.5 * math.pi) ** 2))) < 0.05
 
 
+@pytest.mark.parametrize("own_motion", ["auto", "mocap"])
+@pytest.mark.parametrize("k_v", [0.1, 2.0])
+def test_robots_that_are_faster_than_their_scenario_says_are_followed(own_motion: str, k_v: float) -> None:
+    """From the first row on at seven times the speed of a TurtleBot3, as robots of another kind may be."""
+    t = np.arange(0.0, 3.0, 0.02)
+    random, heading = np.random.default_rng(3), 0.3 * t
+    follower = np.column_stack([5.0 * np.sin(heading), 5.0 * (1.0 - np.cos(heading)), heading])
+    leader = follower[:, :2] + np.column_stack([0.1 * t, 0.5 + 0.0 * t])
+    leader, follower = (a + 1e-4 * random.standard_normal(a.shape) for a in (leader, follower))
+    scenario = abreast.load_scenario("turtlebot3", {"leader.k_v": k_v})
+    found = abreast.estimate(t, leader, follower, scenario=scenario, own_motion=own_motion)
+    late = t > 1.2
+    assert np.all(found.status[late] == "tracking")
+    assert np.abs(found.v1[late] - 1.56).max() < 0.06
+
+
 def test_rows_that_were_not_seen_are_missing_and_nothing_is_shifted(rows: dict[str, Any]) -> None:
     leader, follower = rows["leader"].copy(), rows["follower"].copy()
     leader[200:230] = math.nan

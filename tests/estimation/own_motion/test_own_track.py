@@ -139,6 +139,16 @@ def test_a_flipped_heading_is_left_out_and_a_robot_that_was_moved_is_found_again
     assert track.motion()[:2] == pytest.approx((0.1, 0.0), abs=0.01)
 
 
+@pytest.mark.parametrize("v", [-3.0, 1.5, 6.0])
+def test_a_robot_that_drives_faster_than_it_is_told_to_is_found_too(v: float) -> None:
+    """The first poses do not fit 0.2 m/s, and those after them only once its speed is known."""
+    track = track_of(driven(20, v, 0.4))
+    assert track.points()[-1].rejected == 0
+    motion = track.motion()
+    assert abs(motion.v2 - v) < 4.0 * motion.sd_v2 < 0.3
+    assert abs(motion.u2 - 0.4) < 4.0 * motion.sd_u2
+
+
 def test_after_a_long_silence_nothing_is_taken_for_known() -> None:
     track = track_of(driven(60, 0.08, 0.2))
     track.fold(60 * FRAME_NS + 2_000_000_000, Pose(0.0, 0.0, 0.0))

@@ -6,6 +6,7 @@ import pytest
 
 from estimation.filters.belief import Model
 from estimation.filters.filter import Filter, Kind, filter_of
+from estimation.filters.gaussian import speed_of
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, mean_motion
 from estimation.models.measurement import (
     FrontEnd,
@@ -61,8 +62,25 @@ def test_measurements_that_agree_are_filtered_into_one_track() -> None:
 
 @pytest.mark.parametrize("last", [frame(3, aside=0.05), frame(3, follower_aside=0.05)])
 def test_one_that_does_not_agree_begins_another(last: Measurement) -> None:
-    assert together(*map(frame, range(3)), last) == together(last)
-    assert together(last).frames == 1
+    found, alone = together(*map(frame, range(3)), last), together(last)
+    assert found._replace(belief=alone.belief) == alone
+    assert found.belief._replace(vx=0.0, vy=0.0) == alone.belief
+    assert alone.frames == 1
+
+
+@pytest.mark.parametrize("front_end", list(FrontEnd))
+def test_a_leader_faster_than_any_was_said_to_be_agrees_with_itself_from_the_third_on(
+    front_end: FrontEnd,
+) -> None:
+    """Thirty times k_v, before a follower that drives and turns."""
+    of, dt, speed = estimator(front_end), STEP_NS * 1e-9, 30.0 * LIMITS.k_v
+    measure = measure_world if front_end is FrontEnd.WORLD else measure_body_from_mocap
+    seen = [
+        measure(k * STEP_NS, (speed * k * dt, 0.3), advance(HERE, OWN.v2, OWN.u2, k * dt), NOISE, OWN)
+        for k in range(6)
+    ]
+    assert [together(*seen[: k + 1], of=of).frames for k in range(6)] == [1, 1, 2, 3, 4, 5]
+    assert speed_of(together(*seen, of=of).belief) == pytest.approx(speed, rel=0.05)
 
 
 def test_a_follower_is_expected_where_its_motion_leads_in_the_time_that_has_passed() -> None:
