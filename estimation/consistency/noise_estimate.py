@@ -7,8 +7,8 @@ millimetre at ten. So they tell noise from manoeuvres without knowing any model 
 
 Noise that one frame shares with the next is missing in them: that of filtered poses, and of bodies that rock
 as they drive, some five times a second. Therefore the same differences are taken over strides of some 100 ms
-as well, half of such a swing. Over these a speed step is as large as noise is, so that they can keep the
-scale from falling below one, and no more.
+as well, half of such a swing. Over these a speed step is as large as noise is, so that by themselves they
+keep the scale from falling below one, and no more. Strides of twice that tell how much of them motion can be.
 
 Noise is that of bodies that move; who stands is quieter, and isn't asked.
 
@@ -21,7 +21,15 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from estimation.consistency.noise_level import AS_TOLD, Innovation, Level, certain_scale, learned
+from estimation.consistency.noise_level import (
+    AS_TOLD,
+    Innovation,
+    Level,
+    certain_scale,
+    learned,
+    level_or_anew,
+    shaken_scale,
+)
 from estimation.models.measurement import PairSeen, PoseNoise
 from estimation.tracking.track_point import GATED, RESTARTED, TrackPoint
 from formation.kernel import kernel
@@ -33,6 +41,7 @@ REFUTED = 1.3
 
 _NS = 1e-9
 STRIDE_NS = 97_000_000  # no multiple of a usual spacing of frames, so that a microsecond doesn't matter
+_LONG_STRIDES = 2
 LONGEST_NS = 520_000_000  # four positions further apart tell more of the motion than of the noise
 _ANOTHER = 2.0  # factor between two scales that don't agree; real bodies rock now more, now less
 _FOLLOWED = 3.0  # [s] in which what rests on a scale follows one that becomes known more exactly
@@ -94,17 +103,19 @@ class NoiseScale(NamedTuple):
 class NoiseEstimate(NamedTuple):
     """All that is known of the noise.
 
-    scale: what measurements are taken with now. frames, strides: neighbouring frames, and frames some
-    100 ms apart. gated: whether the newest frame or sighting wasn't believed. basis: scale of positions that
-    what is learned of the leader's driving rests on.
+    scale: what measurements are taken with now. frames, strides, long_strides: neighbouring frames, and such
+    as are some 100 and 200 ms apart. gated: whether the newest frame or sighting wasn't believed. basis:
+    scale of positions that what is learned of the leader's driving rests on.
     """
 
     scale: NoiseScale
     by_frame: Levels
     by_stride: Levels
+    by_long_stride: Levels
     sight: SightLevels
     frames: Moments
     strides: Moments
+    long_strides: Moments
     gated: bool
     basis: float
 
@@ -124,7 +135,9 @@ NOISE_AS_TOLD = NoiseEstimate(
     NoiseScale(1.0, 1.0, 1.0, 1.0),
     Levels(AS_TOLD, AS_TOLD),
     Levels(AS_TOLD, AS_TOLD),
+    Levels(AS_TOLD, AS_TOLD),
     SightLevels(AS_TOLD, AS_TOLD),
+    _NO_MOMENTS,
     _NO_MOMENTS,
     _NO_MOMENTS,
     gated=False,
@@ -142,8 +155,12 @@ def scaled_noise(told: PoseNoise, estimate: NoiseEstimate) -> PoseNoise:
 @kernel
 def kept_noise(estimate: NoiseEstimate) -> NoiseEstimate:
     """What stays known of the noise when the frames before are forgotten."""
-    frames, strides = estimate.frames, estimate.strides
-    return estimate._replace(frames=frames._replace(held=0), strides=strides._replace(held=0), gated=False)
+    return estimate._replace(
+        frames=estimate.frames._replace(held=0),
+        strides=estimate.strides._replace(held=0),
+        long_strides=estimate.long_strides._replace(held=0),
+        gated=False,
+    )
 
 
 @kernel(inline=False)
@@ -165,26 +182,52 @@ def noise_with_frame(
         followed = min(1.0, since_ns * _NS / _FOLLOWED)
         if since_ns > LONGEST_NS:
             estimate = kept_noise(estimate)._replace(gated=gated)
-    by_frame = _differenced(estimate.by_frame, estimate.frames, estimate.strides, moment, learning)
-    by_stride, strides = estimate.by_stride, estimate.strides
-    if strides.held == 0 or moment.capture_ns - strides.a.capture_ns >= STRIDE_NS:
-        by_stride = _differenced(by_stride, strides, strides, moment, learning)
-        strides = _pushed(strides, moment)
-    scale = estimate.scale._replace(
-        position=certain_scale(by_frame.position, by_stride.position),
-        heading=certain_scale(by_frame.heading, by_stride.heading),
+    frames, strides = estimate.frames, estimate.strides
+    by_frame = _differenced(estimate.by_frame, frames, strides, moment, learning, LONGEST_NS)
+    estimate = estimate._replace(
+        by_frame=by_frame,
+        by_stride=_or_anew(estimate.by_stride, estimate.by_frame, by_frame),
+        by_long_stride=_or_anew(estimate.by_long_stride, estimate.by_frame, by_frame),
+        frames=_pushed(frames, moment),
     )
-    frames, basis = _pushed(estimate.frames, moment), estimate.basis
-    return NoiseEstimate(
-        scale,
-        by_frame,
-        by_stride,
-        estimate.sight,
-        frames,
-        strides,
-        gated,
-        basis + followed * (scale.position - basis),
+    if _is_due(strides, moment, STRIDE_NS):
+        estimate = _strode(estimate, moment, learning)
+    by_stride, by_long_stride = estimate.by_stride, estimate.by_long_stride
+    position = certain_scale(by_frame.position, by_stride.position)
+    heading = certain_scale(by_frame.heading, by_stride.heading)
+    position = max(position, shaken_scale(by_stride.position, by_long_stride.position))
+    heading = max(heading, shaken_scale(by_stride.heading, by_long_stride.heading))
+    scale, basis = estimate.scale._replace(position=position, heading=heading), estimate.basis
+    return estimate._replace(scale=scale, basis=basis + followed * (position - basis))
+
+
+@kernel(inline=False)
+def _strode(estimate: NoiseEstimate, moment: Moment, learning: NoiseLearning) -> NoiseEstimate:
+    """Estimate with the differences over strides that end with a frame, long ones every other time."""
+    strides, long_strides, by_long = estimate.strides, estimate.long_strides, estimate.by_long_stride
+    by_stride = _differenced(estimate.by_stride, strides, strides, moment, learning, LONGEST_NS)
+    if _is_due(long_strides, moment, _LONG_STRIDES * STRIDE_NS):
+        longest_ns = _LONG_STRIDES * LONGEST_NS
+        by_long = _differenced(by_long, long_strides, strides, moment, learning, longest_ns)
+        long_strides = _pushed(long_strides, moment)
+    return estimate._replace(
+        by_stride=by_stride,
+        by_long_stride=by_long,
+        strides=_pushed(strides, moment),
+        long_strides=long_strides,
     )
+
+
+@kernel
+def _or_anew(levels: Levels, before: Levels, after: Levels) -> Levels:
+    """Levels of strides, anew where those of frames show that the noise has become another one."""
+    position = level_or_anew(levels.position, before.position, after.position)
+    return Levels(position, level_or_anew(levels.heading, before.heading, after.heading))
+
+
+@kernel
+def _is_due(strides: Moments, moment: Moment, stride_ns: int) -> bool:
+    return strides.held == 0 or moment.capture_ns - strides.a.capture_ns >= stride_ns
 
 
 @kernel
@@ -252,10 +295,18 @@ def _pushed(moments: Moments, moment: Moment) -> Moments:
 
 @kernel
 def _differenced(
-    levels: Levels, before: Moments, long_before: Moments, moment: Moment, learning: NoiseLearning
+    levels: Levels,
+    before: Moments,
+    long_before: Moments,
+    moment: Moment,
+    learning: NoiseLearning,
+    longest_ns: int,
 ) -> Levels:
-    """Levels with the differences of a frame and the three before it, of the bodies that move."""
-    far = moment.capture_ns - before.c.capture_ns > LONGEST_NS
+    """Levels with the differences of a frame and the three before it, of the bodies that move.
+
+    Those of frames further apart than ``longest_ns`` tell nothing.
+    """
+    far = moment.capture_ns - before.c.capture_ns > longest_ns
     if before.held < 3 or long_before.held < 3 or far:
         return levels
     since = long_before.c

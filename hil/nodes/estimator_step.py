@@ -144,8 +144,8 @@ def _take_frame(knowns: Rows[Known], memory: Memory, rules: Rules, capture_ns: i
     if rules.source == ODOMETRY:
         return taken
     # Frames that are plainly wrong must not move the follower's own track. One that is not where its motion
-    # took it may be right, and the motion wrong: odometry lies, or the track, which has a gate of its own, has
-    # to begin anew.
+    # took it may be right, and the motion wrong: odometry lies, or the track has to begin anew, which has a
+    # gate of its own.
     believed = taken.cause == BELIEVED or taken.cause == LEADER_OFF or taken.cause == FOLLOWER_OFF
     if taken.verdict == DUPLICATE or taken.verdict == LATE or not believed:
         return taken

@@ -194,6 +194,44 @@ def test_shaking_that_frames_share_keeps_the_noise_from_seeming_small(seed: int)
     assert np.all(found[:, 0] > 0.5)
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("hertz", [3.6, 4.7, 5.9])
+def test_bodies_that_rock_by_more_than_is_told_are_that_noisy(hertz: float, seed: int) -> None:
+    """By 1 mm, 0.7 mm in the root of the mean square, where 0.3 mm are told and neighbours differ by less.
+
+    Swings of which a stride is half a period count for up to twice as much.
+    """
+    shaken = (
+        (t, moment._replace(seen=_shaken(moment.seen, 1e-3 * math.sin(2.0 * math.pi * hertz * t))))
+        for t, moment in frames(seed, 0.8, seconds=15.0)
+    )
+    found = scales(learned(shaken), since=8.0)[:, 0] * TOLD.position
+    assert np.all((found > 0.6e-3) & (found < 1.6e-3))
+
+
+def at_chance(seed: int, fastest: float, every: float, lag: float) -> Speed:
+    """Another speed every so often [s], followed with a lag [s]."""
+    t = np.arange(0.0, 20.0, 0.002)
+    wanted = np.random.default_rng(seed).uniform(0.0, fastest, len(t))[np.int64(t / every)]
+    got = np.empty_like(t)
+    now = 0.0
+    for k, goal in enumerate(wanted.tolist()):
+        now += (goal - now) * (1.0 - math.exp(-0.002 / lag))
+        got[k] = now
+    return lambda at: float(np.interp(at, t, got))
+
+
+@pytest.mark.parametrize("rate", [20.0, 50.0, 120.0, 240.0])
+@pytest.mark.parametrize("fastest", [0.2, 2.0])
+@pytest.mark.parametrize(("every", "lag"), [(0.7, 0.03), (0.7, 0.1), (2.0, 0.03), (5.0, 0.1)])
+def test_no_driving_passes_for_rocking(every: float, lag: float, fastest: float, rate: float) -> None:
+    """However fast and abrupt: what strides find is no more than what neighbouring frames do."""
+    speed = at_chance(1, fastest, every, lag)
+    for t, estimate in learned(frames(1, 1.0, seconds=15.0, speed=speed, rate=rate)):
+        by_frame = max(1.0, math.sqrt(estimate.by_frame.position.ratio))
+        assert estimate.scale.position < 1.1 * by_frame, (t, estimate.scale)
+
+
 def _shaken(seen: PairSeen, by: float) -> PairSeen:
     own = seen.follower._replace(x=seen.follower.x + by, y=seen.follower.y + by)
     return PairSeen(seen.leader_x + by, seen.leader_y + by, own)
