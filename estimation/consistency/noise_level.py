@@ -19,6 +19,7 @@ _BEGIN = 6.0  # differences that what is told counts as
 _QUICK, _SLOW = 100.0, 1600.0  # differences that the two means reach back
 _CHANGED = 2.2  # factor between the two variances, some four deviations, by which the noise has changed
 _ANEW = 50.0  # differences that it then counts as
+_MUCH = 1.5  # from which on a level of strides would be noticed
 _VARIANCE = 6.0  # of a mean over n, times n: 2 of squares, 2.3 as differences overlap, 1.3 as they are cut
 _SURE = 2.5  # standard deviations by which the noise must differ from what is told
 
@@ -56,12 +57,15 @@ def learned(level: Level, news: Innovation, scale: float) -> Level:
 
 @kernel
 def level_or_anew(by_stride: Level, before: Level, after: Level) -> Level:
-    """Level of strides, or none where what it is made of has ended: noise of frames that is another one now.
+    """Level of strides, cut down where it is made of noise of frames that has ended; they tell so far sooner.
 
-    Frames tell so in a tenth of the time; of what shakes bodies besides they tell nothing.
+    What shakes bodies besides has not ended with that, nor is it known to be less than was told.
     """
     ended = after.weight < before.weight and by_stride.ratio < _CHANGED * before.ratio
-    return AS_TOLD if ended else by_stride
+    most = max(1.0, after.ratio)
+    if not ended or by_stride.ratio < _MUCH:
+        return by_stride
+    return Level(min(by_stride.ratio, most), min(by_stride.quick, most), min(by_stride.weight, _BEGIN))
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""The noise that an estimator found, and what is no longer guaranteed where it exceeds what was told."""
+"""The noise that an estimator found, and what is no longer guaranteed where an assumption is refuted."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from estimation.bounds.certified import Failed
+from hil.nodes.findings import Findings
+from hil.nodes.leader_findings import LIMITS_BROKEN
 from hil.nodes.noise_report import is_refuted
 
 _FAILED = Failed.NOISE.value
@@ -16,11 +18,18 @@ def judge_noise(scale: float | None) -> dict[str, float]:
     return {} if scale is None else {"scale": scale}
 
 
-def supported(certificate: Mapping[str, Any], scale: float | None) -> Mapping[str, Any]:
-    """A certificate's JSON; if what is told of the noise is refuted with the reason in place of figures."""
-    if not is_refuted(scale):
+def refuted(scale: float | None, found: Mapping[str, Findings]) -> str | None:
+    """Which assumption of a certificate a run has refuted, by its noise and its nodes' findings, if any."""
+    if is_refuted(scale):
+        return f"positions scatter {scale:.2g} times as much as it assumes"
+    beyond = next((each[LIMITS_BROKEN] for each in found.values() if LIMITS_BROKEN in each), None)
+    return None if beyond is None else f"the leader goes beyond its limits: {beyond}"
+
+
+def supported(certificate: Mapping[str, Any], why: str | None) -> Mapping[str, Any]:
+    """A certificate's JSON, with the reason in place of figures where one of its assumptions is refuted."""
+    if why is None:
         return certificate
-    why = f"positions scatter {scale:.2g} times as much as it assumes"
     return {name: {"why": why, "assumes": claim.get("assumes", [])} for name, claim in certificate.items()}
 
 

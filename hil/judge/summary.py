@@ -23,7 +23,7 @@ from hil.judge.estimation import judge_estimation
 from hil.judge.findings import findings_list
 from hil.judge.formation import judge_formation
 from hil.judge.made_by import law_json
-from hil.judge.noise import certain, judge_noise, supported
+from hil.judge.noise import certain, judge_noise, refuted, supported
 from hil.judge.published_bounds import judge_published
 from hil.judge.run_data import RunData
 from hil.log.report_json import known
@@ -53,7 +53,8 @@ def summarise(run_data: RunData) -> dict[str, Any]:
     could have told. ``orders_refused``: why the scenario's own orders to change sides were, if they were.
     ``window``: when alone estimates, bounds, formation and spells are judged, where that was asked for.
     ``certificate``: what was guaranteed beforehand, as ``abreast bounds`` prints it, and ``certified`` hold
-    no figures where ``noise`` says that the noise exceeds what they rest on.
+    no figures where ``noise`` says that the noise exceeds what they rest on, and the certificate none where a
+    finding says that the leader goes beyond its limits.
     """
     columns = columns_of(run_data)
     given = run_data.scenario
@@ -77,7 +78,8 @@ def summarise(run_data: RunData) -> dict[str, Any]:
         "noise": judge_noise(scale),
         "certified": certain(judge_certified(run_data.certified, columns.truth, columns.span), scale),
         "certificate": supported(
-            run_data.certificate or certificate_json(certificate_of(given, driven=driven)), scale
+            run_data.certificate or certificate_json(certificate_of(given, driven=driven)),
+            refuted(scale, run_data.found or {}),
         ),
         "formation": judge_formation(run_data, columns),
         "latency_ms": _latency(columns),

@@ -29,7 +29,7 @@ from hil.nodes.findings import Findings, named_findings
 from hil.nodes.frame_findings import bodies_text, clock_rule, frame_findings
 from hil.nodes.frame_looks import LOOK_NS, Look, look_at, names_in, recent, with_look
 from hil.nodes.frame_time import clock_report
-from hil.nodes.leader_findings import leader_findings
+from hil.nodes.leader_findings import leader_findings, limits_findings
 from hil.nodes.leader_mount import UNWATCHED, LeaderMountWatch, with_leader
 from hil.nodes.mount_report import mount_findings, mount_problem, mount_report
 from hil.nodes.node import Counts, Outgoing, diagnostics, is_due, named_counts, outgoing
@@ -298,6 +298,8 @@ class EstimatorNode:
         found = {**mounts, **odometry_findings(known, rules, now_ns)}
         found |= noise_findings(known.noise, rules.noise_learning)
         found |= leader_findings(known.travel, now_ns)
+        if known.track.length > 0:
+            found |= limits_findings(state.memory.track[-1], rules.filter.limits)
         if looks := recent(state.looks, now_ns):
             found |= frame_findings(looks, self._clock_rule)
             if looks[-1].pair is None and (wrong := bodies_text(self._bodies, names_in(state.looked_at))):

@@ -33,6 +33,7 @@ ADVICE = {
         "deviations are not what errors are: set the sigmas and the leader's limits to what is true; wrong "
         'odometry shows so as well, which estimator.own_motion = "auto" judges'
     ),
+    "leader_limits": "set the leader's limits to what it does: estimates, bounds and certificate rest on it",
     "cusp": "the leader stood or turned back: give the estimator a moment of travel before relying on alpha1",
     "second_sender": "end all but one of those who send on this topic",
     "guard_latched": "see what it says; abreast arm lets the robot be driven again",

@@ -14,6 +14,7 @@ from hil.scenario.files import with_overrides
 from hil.scenario.schema import Scenario
 
 _NS = 1e-9
+_BURSTS = 2.0  # times the usual spacing of rows, from which on it is that within bursts
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +59,23 @@ def imported(
 
 
 def rate_of(t_ns: Times) -> float:
-    """Rows per second, as most of them have it; 0 for a single one."""
-    return float(1e9 / np.median(np.diff(t_ns))) if len(t_ns) > 1 else 0.0
+    """Rows per second, as most of them have it, or bursts of rows if they come so; 0 for a single one."""
+    if len(t_ns) < 2:
+        return 0.0
+    middle, period = float(np.median(np.diff(t_ns))), period_ns(t_ns)
+    return 1e9 / (period if period > _BURSTS * middle else middle)
+
+
+def period_ns(t_ns: Times) -> float:
+    """Time between two rows [ns] that most of the time is as long or longer; 0 for a single one.
+
+    Of rows that come in bursts it is that between bursts; a gap of half of a recording does not count.
+    """
+    spacing = np.sort(np.diff(t_ns).astype(np.float64))
+    if not spacing.size:
+        return 0.0
+    passed = np.cumsum(spacing)
+    return float(spacing[np.searchsorted(passed, 0.25 * passed[-1])])
 
 
 def at_rate_of(recorded: Recorded, scenario: Scenario) -> Scenario:

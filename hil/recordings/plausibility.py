@@ -19,7 +19,12 @@ _TILTED_DEG = 30.0  # what messages are refused by
 
 def doubts(recorded: Recorded, scenario: Scenario) -> tuple[str, ...]:
     """What does not look right, a line each, with what to do."""
-    return (*_distance(recorded), *_tilt(recorded), *_speed(recorded, scenario))
+    return (
+        *_distance(recorded),
+        *_tilt(recorded),
+        *_speed(recorded, scenario),
+        *_turning(recorded, scenario),
+    )
 
 
 def _distance(recorded: Recorded) -> Iterator[str]:
@@ -63,12 +68,38 @@ def _speed(recorded: Recorded, scenario: Scenario) -> Iterator[str]:
         )
 
 
+def _turning(recorded: Recorded, scenario: Scenario) -> Iterator[str]:
+    if recorded.leader is None:
+        return
+    seen = known_rows(recorded.leader)
+    hardest = hard_turn(recorded.t_ns[seen], recorded.leader[seen])
+    if hardest > _BEYOND * scenario.leader.k_u:
+        yield (
+            f"the leader turns at {hardest:.2g} rad/s, leader.k_u is {scenario.leader.k_u:g}: "
+            f"add --set leader.k_u={_BEYOND * hardest:.2g}"
+        )
+
+
+def hard_turn(t_ns: Times, placements: FloatArray) -> float:
+    """Turn rate [rad/s] over half a second that nineteen in twenty rows keep below; 0 for a shorter track.
+
+    Of bodies without an orientation, whose quaternions do not turn, it is 0.
+    """
+    qx, qy, qz, qw = placements[:, 3:7].T
+    heading = np.unwrap(np.arctan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz)))
+    return _fast(t_ns, heading[:, np.newaxis])
+
+
 def fast_speed(t_ns: Times, positions: FloatArray) -> float:
     """Speed [m/s] over half a second that nineteen in twenty rows keep below; 0 for a shorter track."""
+    return _fast(t_ns, positions)
+
+
+def _fast(t_ns: Times, places: FloatArray) -> float:
     after = np.searchsorted(t_ns, t_ns + _STEP_NS)
     first = np.flatnonzero(after < len(t_ns))
     if not first.size:
         return 0.0
     last = after[first]
-    way = np.linalg.norm(positions[last] - positions[first], axis=1)
+    way = np.linalg.norm(places[last] - places[first], axis=1)
     return float(np.percentile(way / ((t_ns[last] - t_ns[first]) * 1e-9), 95.0))

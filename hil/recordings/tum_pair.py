@@ -13,6 +13,7 @@ from hil.errors import UsageError
 from hil.recordings.body_tracks import BodyTrack, Export, at_times
 from hil.recordings.delimited import find_layout, is_comment
 from hil.recordings.export_cells import Place, read_export
+from hil.recordings.imported import period_ns
 from hil.recordings.motive_export import seen_only
 from hil.recordings.pair_log import Times
 from hil.recordings.text_file import Text, read_text
@@ -53,7 +54,7 @@ def read_tum_pair(leader: Path, follower: Path) -> Export:
             f"recordings {leader} and {follower}: have no time in common ({_span(led.t_ns)} and "
             f"{_span(follows.t_ns)}); use trajectories of one recording, by one clock"
         )
-    most_ns = int(_PERIODS * np.median(np.diff(led.t_ns)))
+    most_ns = int(_PERIODS * period_ns(led.t_ns))
     met = at_times(led.t_ns, led.placements, follows.t_ns, most_ns)
     facts = ["TUM trajectories", "meters", "quaternions"]
     between = int(np.count_nonzero(~np.isin(follows.t_ns, led.t_ns)))

@@ -8,18 +8,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from estimation.filters.belief import Model
+from estimation.filters.filter import Kind, filter_of
+from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
+from estimation.models.measurement import FrontEnd, PoseNoise, measure_world
+from estimation.tracking.track_point import GATED, USED, TrackPoint, begun
 from estimation.tracking.tracker import Status
 from estimation.tracking.travel_watch import NO_TRAVEL
+from formation.pose import Pose
 from hil.judge.columns import columns_of, inside
 from hil.judge.estimation import errors_at
 from hil.judge.run_data import Span, run_data_of_log
 from hil.judge.summary import summarise
 from hil.lockstep.run import run_lockstep
 from hil.log.reader import read_log
-from hil.nodes.leader_findings import leader_findings
+from hil.nodes.leader_findings import leader_findings, limits_findings
 from hil.scenario.files import load_scenario
 
 SECOND_NS = 1_000_000_000
+LIMITS = LeaderLimits(v_eps=0.04, k_v=0.1, k_u=0.7)
 
 
 def test_a_leader_that_turned_back_is_spoken_of_for_a_while() -> None:
@@ -27,6 +34,44 @@ def test_a_leader_that_turned_back_is_spoken_of_for_a_while() -> None:
     turned = NO_TRAVEL._replace(turned_ns=10 * SECOND_NS)
     assert "direction of travel" in leader_findings(turned, 11 * SECOND_NS)["cusp"]
     assert not leader_findings(turned, 13 * SECOND_NS)
+
+
+def seen_driving(v1: float, u1: float, sd: float = 1e-3) -> TrackPoint:
+    """A settled track's newest point, of a leader that drives aslant."""
+    rest = FollowerMotion(0.0, 0.0, 0.0, 0.0)
+    seen = measure_world(SECOND_NS, (1.0, 2.0), Pose(0.5, 2.0, 0.0), PoseNoise(3e-4, 3.5e-3), rest)
+    point = begun(seen, filter_of(Kind.EKF, Model(FrontEnd.WORLD, LIMITS, ProcessNoise.by_rule(LIMITS, 0.5))))
+    vx, vy = 0.6 * v1, 0.8 * v1
+    belief = point.belief._replace(vx=vx, vy=vy, u=u1, vx_vx=sd * sd, vx_vy=0.0, vy_vy=sd * sd, u_u=0.01**2)
+    return point._replace(belief=belief, verdict=USED, settled=True)
+
+
+@pytest.mark.parametrize(
+    ("v1", "u1", "said"),
+    [
+        (0.2, 0.0, ["it drives at 0.2 m/s, expected up to leader.k_v = 0.1"]),
+        (0.08, -1.1, ["it turns at 1.1 rad/s, expected up to leader.k_u = 0.7"]),
+        (0.2, 1.1, ["it drives at 0.2 m/s", "it turns at 1.1 rad/s"]),
+        (0.1, 0.7, []),
+        (0.112, 0.78, []),
+    ],
+)
+def test_a_leader_beyond_what_is_told_of_it_is_named(v1: float, u1: float, said: list[str]) -> None:
+    found = limits_findings(seen_driving(v1, u1), LIMITS)
+    assert set(found) == ({"leader_limits"} if said else set())
+    for each in said:
+        assert each in found["leader_limits"]
+
+
+def test_what_is_not_sure_is_no_broken_limit() -> None:
+    fast = seen_driving(0.2, 0.0)
+    assert limits_findings(fast, LIMITS)
+    for unsure in (
+        seen_driving(0.2, 0.0, sd=0.03),
+        fast._replace(settled=False),
+        fast._replace(verdict=GATED),
+    ):
+        assert not limits_findings(unsure, LIMITS)
 
 
 @pytest.mark.parametrize("takes_s", [0.01, 1.0])

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from hil.log.reader import read_log
 from hil.recordings.column_map import ColumnMap, load_column_map, no_map
-from hil.recordings.imported import Imported
+from hil.recordings.imported import Imported, rate_of
 from hil.recordings.track_import import import_recording, import_tum
 from hil.wire import topics
 from hil.wire.message_types import Odometry, RigidBodies
@@ -277,6 +277,21 @@ def test_a_pair_of_trajectories_is_read_as_it_was_written(
     done = import_tum(*paths, NO_MAP, tmp_path / "log.mcap")
     assert (done.damage, done.gaps) == ((), {})
     check_poses(tmp_path / "log.mcap", pair)
+
+
+def test_a_leader_whose_rows_come_in_bursts_is_there_between_them(tmp_path: Path) -> None:
+    """Ten rows within 90 us, and 30 ms until the next ten, as a buffer passes on what it has gathered."""
+    t = np.arange(0.0, 2.0, 0.01)
+    bursts = np.sort((np.arange(0.0, 2.1, 0.03)[:, np.newaxis] + 1e-5 * np.arange(10)).ravel())
+    paths = tmp_path / "l.txt", tmp_path / "f.txt"
+    for path, times in zip(paths, (bursts, t), strict=True):
+        zero = np.zeros_like(times)
+        rows = np.column_stack([0.1 * times, zero, zero, zero, zero, zero, zero + 1.0])
+        path.write_bytes(tum_text(np.round(times * 1e9).astype(int).tolist(), rows, comments=True))
+    assert import_tum(*paths, NO_MAP, tmp_path / "log.mcap").gaps == {}
+    turned = tuple(reversed(paths))
+    assert rate_of(np.round(bursts * 1e9).astype(np.int64)) == pytest.approx(1.0 / 0.03, rel=0.01)
+    assert import_tum(*turned, NO_MAP, tmp_path / "turned.mcap").gaps == {"leader": 30}
 
 
 def test_a_leader_is_taken_between_its_rows_but_not_across_a_gap(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from formation.angles import FloatArray
 from hil.recordings.pair_log import Recorded, planar_placements
-from hil.recordings.plausibility import doubts, fast_speed
+from hil.recordings.plausibility import doubts, fast_speed, hard_turn
 from hil.scenario.files import load_scenario
 
 SCENARIO = load_scenario("turtlebot3")
@@ -44,6 +44,14 @@ def test_a_tilted_body_is_said_and_a_few_tilted_rows_are_not() -> None:
     follower[:, 3:] = np.array([1.0, 0.0, 0.0, 1.0]) * np.sqrt(0.5)
     (found,) = doubts(Recorded(T_NS, placed(0.08 * T, 0.3), follower), SCENARIO)
     assert found.startswith("the follower is tilted by 90 degrees")
+
+
+def test_a_leader_that_turns_harder_than_it_is_told_to_is_said() -> None:
+    leader = placed(0.0 * T, 0.3)
+    leader[:, 5], leader[:, 6] = np.sin(0.8 * T), np.cos(0.8 * T)
+    (found,) = doubts(Recorded(T_NS, leader, placed(0.08 * T, 0.0)), SCENARIO)
+    assert found == "the leader turns at 1.6 rad/s, leader.k_u is 0.7: add --set leader.k_u=1.9"
+    assert hard_turn(T_NS, placed(0.3 * T, 0.0)) == 0.0
 
 
 def test_a_speed_takes_half_a_second() -> None:
