@@ -247,5 +247,7 @@ def _bounds(
 
 def _require_magnitudes(**bounds: Values) -> None:
     for name, value in bounds.items():
+        if isinstance(value, float) and 0.0 <= value < math.inf:
+            continue
         if not np.all(np.isfinite(value) & (np.asarray(value) >= 0.0)):
             raise ValueError(f"{name} is {value}, expected finite numbers >= 0")

@@ -80,7 +80,7 @@ class EstimateColumns:
 
     def only(self, rows: NDArray[np.bool_]) -> EstimateColumns:
         """The estimates in the given rows."""
-        if np.all(rows):
+        if rows.all():
             return self
         seen = Perceived(*(np.asarray(getattr(self.seen, name))[rows] for name in _SEEN))
         return EstimateColumns(

@@ -155,8 +155,7 @@ def least_deviations(
     path = TruePath(moments, leader, truth.follower[near], motion, measured)
     wanted = np.zeros(len(moments), dtype=np.bool_)
     wanted[_nearest(moments, columns.samples.capture_ns)[::EVERY]] = True
-    bounds = cramer_rao(path, _model(scenario), noise, sd_v2, sd_u2, wanted)
-    return {name: bound[wanted] for name, bound in bounds.items()}
+    return cramer_rao(path, _model(scenario), noise, sd_v2, sd_u2, wanted)
 
 
 def _nearest(moments_ns: Stamps, wanted_ns: Stamps) -> NDArray[np.int64]:
@@ -173,9 +172,10 @@ def _nearest(moments_ns: Stamps, wanted_ns: Stamps) -> NDArray[np.int64]:
 def _marked(moments_ns: Stamps, others_ns: Stamps) -> NDArray[np.bool_]:
     """Which of the increasing moments are among others, in whatever order these are."""
     among = np.zeros(len(moments_ns), dtype=np.bool_)
-    rows = np.searchsorted(moments_ns, others_ns)
-    others_ns, rows = others_ns[rows < len(moments_ns)], rows[rows < len(moments_ns)]
-    among[rows[moments_ns[rows] == others_ns]] = True
+    if len(moments_ns):
+        others_ns = others_ns[(others_ns >= moments_ns[0]) & (others_ns <= moments_ns[-1])]
+        rows = np.searchsorted(moments_ns, others_ns)
+        among[rows[moments_ns[rows] == others_ns]] = True
     return among
 
 
