@@ -12,10 +12,8 @@ from estimation.bounds.error_bounds import (
     Perceived,
     RateErrors,
     Values,
-    extended_bounds,
-    paper_alpha1,
-    paper_h,
-    sound_bounds,
+    paper_bounds,
+    sound_and_extended_bounds,
 )
 from formation.angles import FloatArray, wrap
 from formation.spacing import Spacing
@@ -65,8 +63,8 @@ def all_bounds(
     station: Station = ABREAST,
 ) -> dict[str, FloatArray]:
     """Every named bound for the same moment(s): the keys of ``bounds`` in the JSON of a run."""
-    sound = sound_bounds(perceived, rates, v_eps, mu1, spacing, station)
-    extended = extended_bounds(perceived, rates, inputs, v_eps, mu1, spacing, station)
+    paper = paper_bounds(perceived, rates, v_eps, mu1, spacing)
+    sound, extended = sound_and_extended_bounds(perceived, rates, inputs, v_eps, mu1, spacing, station)
     return {
         "v1": sound.v1,
         "alpha1": sound.alpha1,
@@ -74,8 +72,8 @@ def all_bounds(
         "v1_extended": extended.v1,
         "alpha1_extended": extended.alpha1,
         "h_extended": extended.h,
-        "paper_alpha1": paper_alpha1(perceived, rates, v_eps),
-        "paper_h": paper_h(perceived, rates, mu1, spacing),
+        "paper_alpha1": paper.alpha1,
+        "paper_h": paper.h,
     }
 
 

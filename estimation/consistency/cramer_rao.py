@@ -63,7 +63,7 @@ def state_bound(path: TruePath, model: Model, sigma_position: float) -> NDArray[
     Each measurement has covariance sigma_position^2 I [m^2]; before the first there is no bound (NaN).
     Raises :class:`ValueError` for a model of another front end than the world's.
     """
-    wanted = np.zeros(len(path.capture_ns), dtype=np.bool_)
+    wanted = np.ones(len(path.capture_ns), dtype=np.bool_)
     found = _bounds(path, model, PoseNoise(sigma_position, 0.0), (0.0, 0.0), wanted)
     bounds = np.full((len(wanted), STATE_SIZE, STATE_SIZE), math.nan)
     rows = columns_of(found)
@@ -89,7 +89,7 @@ def cramer_rao(
     average the squares. Infinite before the first measurement. ``wanted``: (n,) bool, None for all.
     """
     asked = np.ones(len(path.capture_ns), dtype=np.bool_) if wanted is None else wanted
-    rows = columns_of(_bounds(path, model, pose_noise, (sd_v2, sd_u2), asked))[asked]
+    rows = columns_of(_bounds(path, model, pose_noise, (sd_v2, sd_u2), asked))
     return {name: np.sqrt(rows[name]) for name in QUANTITIES}
 
 
@@ -104,9 +104,9 @@ def _bounds(
 
     if model.front_end is not FrontEnd.WORLD:
         raise ValueError(f"front end is {model.front_end.value!r}, expected 'world'")
-    n = len(path.capture_ns)
-    bounds, terms = rows_of(Least, n), Terms(model.limits, model.noise, pose_noise, *sd_motion)
-    if n > 0:
+    bounds = rows_of(Least, int(np.count_nonzero(wanted)))
+    terms = Terms(model.limits, model.noise, pose_noise, *sd_motion)
+    if len(path.capture_ns):
         states = (path.leader, path.follower_pose, path.follower_motion)
         leader, pose, motion = (np.ascontiguousarray(each, dtype=np.float64) for each in states)
         carry_bounds(

@@ -19,7 +19,7 @@ _NS = 1e-9
 
 
 class Moment(NamedTuple):
-    """The truth at one capture; ``wanted``: whether the bound is to be mapped to the quantities here."""
+    """The truth at one capture; ``wanted``: whether the bound here is asked for."""
 
     capture_ns: int
     leader: State
@@ -52,7 +52,7 @@ class Terms(NamedTuple):
 
 
 class Least(NamedTuple):
-    """Bound after one capture: of the state, and the least variances of the quantities where wanted."""
+    """Bound after one capture: of the state, and the least variances of the quantities."""
 
     known: bool
     state: Gaussian
@@ -65,7 +65,7 @@ class Least(NamedTuple):
 
 @kernel(inline=False)
 def carry(path: Path, terms: Terms, bounds: Rows[Least]) -> None:
-    """Fill the bound after every moment of a path that has some.
+    """Fill the bound after every moment that is wanted of a path that has some.
 
     It starts as the filters do, at the first measurement with what the limits say in advance; before it there
     is none.
@@ -73,7 +73,7 @@ def carry(path: Path, terms: Terms, bounds: Rows[Least]) -> None:
     variance = terms.pose.position * terms.pose.position
     spread, known = Spread(variance, 0.0, variance), False
     belief = started(0.0, 0.0, spread, terms.limits)
-    before = _moment(path, 0)
+    before, filled = _moment(path, 0), 0
     for k in range(len(path.capture_ns)):
         moment = _moment(path, k)
         if known:
@@ -85,10 +85,10 @@ def carry(path: Path, terms: Terms, bounds: Rows[Least]) -> None:
             known = True
             belief = started(moment.leader.x, moment.leader.y, spread, terms.limits)
         belief = _at(belief, moment.leader)
-        least = Least(known, belief, math.inf, math.inf, math.inf, math.inf, math.inf)
-        if known and moment.wanted:
-            least = _mapped(belief, moment, terms)
-        store(bounds, k, least)
+        if moment.wanted:
+            least = Least(known, belief, math.inf, math.inf, math.inf, math.inf, math.inf)
+            store(bounds, filled, _mapped(belief, moment, terms) if known else least)
+            filled += 1
         before = moment
 
 

@@ -22,7 +22,7 @@ from hil.judge.estimation import WARM_UP_NS, estimate_errors, least_deviations
 from hil.judge.noise_free_orbit import NoiseFreeOrbit, noise_free_orbit
 from hil.judge.run_data import Span, judged_from_ns
 from hil.judge.side_orders import Order, desired_bearings
-from hil.judge.true_states import TrueStates
+from hil.judge.true_states import TrueStates, run_of
 from hil.lockstep.flyer import Flown, Flyer
 from hil.scenario.files import build_scenario, scenario_text, with_overrides
 from hil.scenario.links import links_of
@@ -116,7 +116,8 @@ def columns_of_pair(scenario: Scenario, flown: Flown, k: int) -> Columns:
     judged = inside(estimates.capture_ns, span) & (estimates.status == Status.TRACKING)
     samples = estimates.only(judged)
     truth = true_states(flown, k, Span(span.from_ns - WARM_UP_NS, span.to_ns))
-    true = _rows(truth, _sliced(np.searchsorted(truth.capture_ns, samples.capture_ns)))
+    run = run_of(truth.capture_ns, samples.capture_ns)
+    true = _rows(truth, np.searchsorted(truth.capture_ns, samples.capture_ns) if run is None else run)
     return Columns(run_span(scenario), span, estimates, CommandColumns.of(()), truth, samples, true)
 
 
@@ -149,13 +150,6 @@ def _estimates(flown: Flown, k: int) -> EstimateColumns:
 
 def _rows(truth: TrueStates, rows: NDArray[np.int64] | slice) -> TrueStates:
     return TrueStates(**{name: getattr(truth, name)[rows] for name in TrueStates.__slots__})
-
-
-def _sliced(rows: NDArray[np.int64]) -> NDArray[np.int64] | slice:
-    """Rows of which none is left out in between, where no frame was lost, as a slice: that copies nothing."""
-    if len(rows) and rows[-1] - rows[0] == len(rows) - 1 and np.all(np.diff(rows) == 1):
-        return slice(int(rows[0]), int(rows[-1]) + 1)
-    return rows
 
 
 def _add_estimates(tally: NDArray[np.void], scenario: Scenario, columns: Columns, flown: Flown) -> None:
