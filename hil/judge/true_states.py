@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from formation.angles import FloatArray, wrap
 from formation.mount import Mount, is_aligned
-from hil.judge.entries import fill_shapes
 from hil.judge.true_shapes import (
     ALPHA1,
     FOLLOWER_THETA,
@@ -148,6 +147,8 @@ def _with_shape(recorded: FloatArray) -> FloatArray:
     NaN where both robots are in one place: there is no shape. A leader that drives backwards is turned round,
     as its alpha1 is that of its direction of travel.
     """
+    from hil.judge.entries import fill_shapes  # compiles, which who only needs the records is spared
+
     # Column by column in memory: everything that follows works on columns.
     columns = np.empty((_RECORDED_SIZE + _SHAPE_SIZE, len(recorded)))
     columns[:_RECORDED_SIZE] = recorded.T
