@@ -36,7 +36,8 @@ from estimation.models.measurement import FrontEnd, Measurement, PoseNoise, meas
 from estimation.models.motion import Vector, process_noise, propagate
 from estimation.tracking.estimate import estimate_at
 from estimation.tracking.track import Tracker
-from estimation.tracking.tracker import Status, TrackSettings
+from estimation.tracking.track_settings import TrackSettings
+from estimation.tracking.tracker import Status
 from formation.angles import wrap
 from formation.pose import Pose, advance
 from formation.shape import shape_of

@@ -35,7 +35,8 @@ from estimation.tracking.estimate import estimate_of
 from estimation.tracking.smoother import smooth
 from estimation.tracking.track import Tracker, as_filter
 from estimation.tracking.track_point import NO_JUMP
-from estimation.tracking.tracker import Status, TrackSettings
+from estimation.tracking.track_settings import TrackSettings, gate_of
+from estimation.tracking.tracker import Status
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
 from formation.shape import shape_of
@@ -135,9 +136,7 @@ def filtered(of: Filter, run: Run, score: Score) -> Iterator[Gaussian]:
 def smoothed(run: Run, score: Score) -> Iterator[Gaussian]:
     """Beliefs of the smoother; the NIS is that of its forward pass."""
     begun = time.perf_counter()
-    points = smooth(
-        Tracker(make_estimator("ekf", MODEL), TrackSettings(gate_probability=1 - 1e-15)), run.seen
-    )
+    points = smooth(Tracker(make_estimator("ekf", MODEL), TrackSettings(gate=gate_of(1 - 1e-15))), run.seen)
     score.seconds += time.perf_counter() - begun
     score.steps += len(points)
     score.nis += [point.nis for point in points[run.judged[0] :]]

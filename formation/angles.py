@@ -32,8 +32,11 @@ def wrap(angle: float | FloatArray) -> float | FloatArray:
 
 
 def _wrap_array(angle: FloatArray) -> FloatArray:
+    largest = np.abs(angle).max(initial=0.0)
+    if largest < math.pi:
+        return angle.copy()
     turned = angle
-    if not np.all(np.abs(angle) < _TURN):  # else the remainder would change nothing, and takes its time
+    if not largest < _TURN:  # else the remainder would change nothing, and takes its time
         with np.errstate(invalid="ignore"):
             turned = np.fmod(angle, _TURN)
     # Both shifts are exact: the operands are within a factor of two of each other (Sterbenz).

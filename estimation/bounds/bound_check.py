@@ -12,10 +12,8 @@ from estimation.bounds.error_bounds import (
     Perceived,
     RateErrors,
     Values,
-    extended_bounds,
-    paper_alpha1,
-    paper_h,
-    sound_bounds,
+    paper_bounds,
+    sound_and_extended_bounds,
 )
 from formation.angles import FloatArray, wrap
 from formation.spacing import Spacing
@@ -65,8 +63,8 @@ def all_bounds(
     station: Station = ABREAST,
 ) -> dict[str, FloatArray]:
     """Every named bound for the same moment(s): the keys of ``bounds`` in the JSON of a run."""
-    sound = sound_bounds(perceived, rates, v_eps, mu1, spacing, station)
-    extended = extended_bounds(perceived, rates, inputs, v_eps, mu1, spacing, station)
+    paper = paper_bounds(perceived, rates, v_eps, mu1, spacing)
+    sound, extended = sound_and_extended_bounds(perceived, rates, inputs, v_eps, mu1, spacing, station)
     return {
         "v1": sound.v1,
         "alpha1": sound.alpha1,
@@ -74,8 +72,8 @@ def all_bounds(
         "v1_extended": extended.v1,
         "alpha1_extended": extended.alpha1,
         "h_extended": extended.h,
-        "paper_alpha1": paper_alpha1(perceived, rates, v_eps),
-        "paper_h": paper_h(perceived, rates, mu1, spacing),
+        "paper_alpha1": paper.alpha1,
+        "paper_h": paper.h,
     }
 
 
@@ -91,8 +89,8 @@ def h_of(
     that its bound holds there too. At another station, on its own manifold, v2_hat counts with the sine of
     the bearing, by which its law divides.
     """
-    asked = _asked_across(believed, mu1, spacing, station)
-    h: FloatArray = (truth.v1 * np.sin(truth.alpha1) + asked) / np.asarray(truth.rho)
+    asked = _asked_across(believed, _across(believed), mu1, spacing, station)
+    h: FloatArray = (_across(truth) + asked) / np.asarray(truth.rho)
     return h
 
 
@@ -100,11 +98,15 @@ def errors_of(
     perceived: Perceived, truth: SpeedInputs, mu1: float, spacing: Spacing, station: Station = ABREAST
 ) -> dict[str, FloatArray]:
     """Actual magnitudes of the errors of v1 [m/s], alpha1 [rad, at most pi] and h [rad/s]."""
-    believed = SpeedInputs(perceived.rho, perceived.v1, perceived.alpha1)
+    believed, rho = SpeedInputs(perceived.rho, perceived.v1, perceived.alpha1), np.asarray(truth.rho)
+    across = _across(truth)
+    # Both of :func:`h_of`, whose sines take most of the time.
+    asked = _asked_across(believed, _across(believed), mu1, spacing, station)
+    rightly = _asked_across(truth, across, mu1, spacing, station)
     return {
         "v1": np.abs(np.asarray(truth.v1) - believed.v1),
         "alpha1": np.abs(wrap(np.asarray(truth.alpha1) - believed.alpha1)),
-        "h": np.abs(h_of(truth, believed, mu1, spacing, station) - h_of(truth, truth, mu1, spacing, station)),
+        "h": np.abs((across + asked) / rho - (across + rightly) / rho),
     }
 
 
@@ -121,8 +123,10 @@ def check(errors: Mapping[str, Values], bounds: Mapping[str, Values]) -> Verdict
     violations: dict[str, int] = {}
     tightness: dict[str, float] = {}
     for name, bound in bounds.items():
-        error, limit = np.broadcast_arrays(np.asarray(errors[QUANTITY_OF[name]]), np.asarray(bound))
-        violations[name] = int(np.count_nonzero(~(error <= limit + ROUNDING)))
+        error, limit = np.asarray(errors[QUANTITY_OF[name]]), np.asarray(bound)
+        if error.shape != limit.shape:
+            error, limit = np.broadcast_arrays(error, limit)
+        violations[name] = error.size - int(np.count_nonzero(error <= limit + ROUNDING))
         tightness[name] = _tightness(error, limit)
     return Verdict(violations, tightness)
 
@@ -133,16 +137,27 @@ def _tightness(error: FloatArray, limit: FloatArray) -> float:
     Where bound and error are zero up to rounding there is nothing to be tight about.
     """
     counted, positive = error > ROUNDING, limit > 0.0
-    if not np.all(positive):
+    if not positive.all():
         ratio = np.divide(error, limit, out=np.full(error.shape, np.inf), where=positive)
     else:
         ratio = error / limit
-    return float(np.max(ratio if np.all(counted) else ratio[counted], initial=0.0))
+    return float((ratio if counted.all() else ratio[counted]).max(initial=0.0))
 
 
-def _asked_across(seen: SpeedInputs, mu1: float, spacing: Spacing, station: Station) -> FloatArray:
-    """Part across the line [m/s] of the follower speed that Eq. (8) of the paper asks for: v2 sin(alpha2)."""
+def _across(seen: SpeedInputs) -> FloatArray:
+    """Part of the leader's velocity across the line [m/s]."""
+    across: FloatArray = np.asarray(seen.v1) * np.sin(seen.alpha1)
+    return across
+
+
+def _asked_across(
+    seen: SpeedInputs, across: FloatArray, mu1: float, spacing: Spacing, station: Station
+) -> FloatArray:
+    """Part across the line [m/s] of the follower speed that Eq. (8) of the paper asks for: v2 sin(alpha2).
+
+    ``across``: the same part of the leader's velocity.
+    """
     rho, v1 = np.asarray(seen.rho), np.asarray(seen.v1)
     off = np.cos(seen.alpha1 + station.to_abreast)
-    across: FloatArray = -v1 * np.sin(seen.alpha1) + rho * (-mu1 * off + station.sign * v1 * spacing.f(rho))
-    return across
+    asked: FloatArray = rho * (-mu1 * off + station.sign * v1 * spacing.f(rho)) - across
+    return asked

@@ -14,6 +14,7 @@ grows.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -122,7 +123,13 @@ def paper_alpha1(perceived: Perceived, rates: RateErrors, v_eps: Values) -> Floa
 
     It falls short of :func:`sound_alpha1` where v1_hat is close to v_eps; v_eps = 0 gives infinity.
     """
-    velocity_error, floor = np.broadcast_arrays(sound_v1(perceived, rates), np.asarray(v_eps))
+    return _paper_alpha1(sound_v1(perceived, rates), v_eps)
+
+
+def _paper_alpha1(M: FloatArray, v_eps: Values) -> FloatArray:
+    if isinstance(v_eps, float) and v_eps > 0.0:
+        return M / v_eps
+    velocity_error, floor = np.broadcast_arrays(M, np.asarray(v_eps))
     bound: FloatArray = np.divide(
         velocity_error, floor, out=np.full(floor.shape, math.inf), where=floor > 0.0
     )
@@ -152,9 +159,22 @@ def paper_h(perceived: Perceived, rates: RateErrors, mu1: float, spacing: Spacin
 
     The difference of two cosines can reach 2, not 1, and f is negative for rho < rho_0.
     """
-    f = spacing.f(np.asarray(perceived.rho))
-    bound: FloatArray = rates.M_alpha2 + mu1 + f * sound_v1(perceived, rates)
+    return _paper_h(sound_v1(perceived, rates), perceived, rates, mu1, spacing)
+
+
+def _paper_h(
+    M: FloatArray, perceived: Perceived, rates: RateErrors, mu1: float, spacing: Spacing
+) -> FloatArray:
+    bound: FloatArray = rates.M_alpha2 + mu1 + spacing.f(np.asarray(perceived.rho)) * M
     return bound
+
+
+def paper_bounds(
+    perceived: Perceived, rates: RateErrors, v_eps: Values, mu1: float, spacing: Spacing
+) -> Bounds:
+    """:func:`sound_v1`, which is the paper's too, :func:`paper_alpha1` and :func:`paper_h` at once."""
+    M = sound_v1(perceived, rates)
+    return Bounds(M, _paper_alpha1(M, v_eps), _paper_h(M, perceived, rates, mu1, spacing))
 
 
 def sound_h(
@@ -225,27 +245,58 @@ def extended_bounds(
     return _bounds(perceived, rates, inputs, v_eps, law)
 
 
+def sound_and_extended_bounds(
+    perceived: Perceived,
+    rates: RateErrors,
+    inputs: InputErrors,
+    v_eps: Values,
+    mu1: float,
+    spacing: Spacing,
+    station: Station = ABREAST,
+) -> tuple[Bounds, Bounds]:
+    """:func:`sound_bounds` and :func:`extended_bounds` at once."""
+    law = LawConstants.of(0.0, mu1, spacing, station)
+    sound, extended = _bounds_of_all(perceived, rates, (InputErrors(), inputs), v_eps, law)
+    return sound, extended
+
+
 def _bounds(
     perceived: Perceived, rates: RateErrors, inputs: InputErrors, v_eps: Values, law: LawConstants
 ) -> Bounds:
+    return _bounds_of_all(perceived, rates, (inputs,), v_eps, law)[0]
+
+
+def _bounds_of_all(
+    perceived: Perceived,
+    rates: RateErrors,
+    inputs: Sequence[InputErrors],
+    v_eps: Values,
+    law: LawConstants,
+) -> list[Bounds]:
+    """Bounds for each of the input errors."""
     from estimation.bounds.entries import bound_all  # compiles, which who only needs the records is spared
 
     columns = (
         *(getattr(perceived, name) for name in Moment._fields),
-        *(getattr(rates, name) for name in ("M_rho", "M_alpha2")),
-        *(getattr(inputs, name) for name in ("E_rho", "E_alpha2", "E_v2", "E_u2")),
         v_eps,
+        *(
+            column
+            for each in inputs
+            for column in (rates.M_rho, rates.M_alpha2, each.E_rho, each.E_alpha2, each.E_v2, each.E_u2)
+        ),
     )
     shape = np.broadcast_shapes(*map(np.shape, columns))
-    moments, found = np.empty((len(columns), *shape)), np.empty((3, *shape))
+    moments, found = np.empty((len(columns), *shape)), np.empty((len(inputs), 3, *shape))
     for k, column in enumerate(columns):
         moments[k] = column
     count = math.prod(shape)
-    bound_all(moments.reshape(len(columns), count), row_of(law), found.reshape(3, count))
-    return Bounds(*found)
+    bound_all(moments.reshape(len(columns), count), row_of(law), found.reshape(3 * len(inputs), count))
+    return [Bounds(*each) for each in found]
 
 
 def _require_magnitudes(**bounds: Values) -> None:
     for name, value in bounds.items():
+        if isinstance(value, float) and 0.0 <= value < math.inf:
+            continue
         if not np.all(np.isfinite(value) & (np.asarray(value) >= 0.0)):
             raise ValueError(f"{name} is {value}, expected finite numbers >= 0")

@@ -19,14 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.consistency.information import Least, Moment, Terms
+from estimation.consistency.information import Least, Terms
 from estimation.filters.belief import Model
-from estimation.models.coordinated_turn import State
 from estimation.models.measurement import FrontEnd, PoseNoise
 from estimation.models.motion import STATE_SIZE, Matrix, Vector
 from estimation.tracking.estimate import QUANTITIES
-from formation.pose import Pose
-from formation.records import Rows, columns_of, load, rows_of, store
+from formation.records import Rows, columns_of, load, row_of, rows_of
 
 _NS = 1e-9
 
@@ -65,7 +63,7 @@ def state_bound(path: TruePath, model: Model, sigma_position: float) -> NDArray[
     Each measurement has covariance sigma_position^2 I [m^2]; before the first there is no bound (NaN).
     Raises :class:`ValueError` for a model of another front end than the world's.
     """
-    wanted = np.zeros(len(path.capture_ns), dtype=np.bool_)
+    wanted = np.ones(len(path.capture_ns), dtype=np.bool_)
     found = _bounds(path, model, PoseNoise(sigma_position, 0.0), (0.0, 0.0), wanted)
     bounds = np.full((len(wanted), STATE_SIZE, STATE_SIZE), math.nan)
     rows = columns_of(found)
@@ -82,14 +80,13 @@ def cramer_rao(
     sd_u2: float,
     wanted: NDArray[np.bool_] | None = None,
 ) -> dict[str, Vector]:
-    """Least standard deviation, each (n,), of :data:`estimation.tracking.estimate.QUANTITIES` over the path.
+    """Least standard deviation of :data:`estimation.tracking.estimate.QUANTITIES` at ``wanted`` captures.
 
     rho_dot and alpha2_dot [m/s, rad/s] also carry the noise of the follower's pose and of its measured motion
     (sd_v2 [m/s], sd_u2 [rad/s]), alpha1 [rad] that of its position: the bound is for estimators that take the
     follower's pose and motion as measured at that moment, unfiltered. Angles are mapped to first order, so
     that a bound of more than about 0.5 rad only says that nothing is known yet. For the RMS over many paths,
-    average the squares. Infinite before the first measurement, and in rows that are not ``wanted`` (None: all
-    are), for which the mapping is left out.
+    average the squares. Infinite before the first measurement. ``wanted``: (n,) bool, None for all.
     """
     asked = np.ones(len(path.capture_ns), dtype=np.bool_) if wanted is None else wanted
     rows = columns_of(_bounds(path, model, pose_noise, (sd_v2, sd_u2), asked))
@@ -107,18 +104,13 @@ def _bounds(
 
     if model.front_end is not FrontEnd.WORLD:
         raise ValueError(f"front end is {model.front_end.value!r}, expected 'world'")
-    n = len(path.capture_ns)
-    moments, bounds = rows_of(Moment, n), rows_of(Least, n)
-    if n == 0:
-        return bounds
-    rows = columns_of(moments)
-    rows["capture_ns"], rows["measured"], rows["wanted"] = path.capture_ns, path.measured, wanted
-    for k, name in enumerate(State._fields):
-        rows["leader"][name] = path.leader[:, k]
-    for k, name in enumerate(Pose._fields):
-        rows["follower"][name] = path.follower_pose[:, k]
-    rows["v2"], rows["u2"] = path.follower_motion.T
-    terms = rows_of(Terms, 1)
-    store(terms, 0, Terms(model.limits, model.noise, pose_noise, *sd_motion))
-    carry_bounds(moments, terms, bounds)
+    bounds = rows_of(Least, int(np.count_nonzero(wanted)))
+    terms = Terms(model.limits, model.noise, pose_noise, *sd_motion)
+    if len(path.capture_ns):
+        states = (path.leader, path.follower_pose, path.follower_motion)
+        leader, pose, motion = (np.ascontiguousarray(each, dtype=np.float64) for each in states)
+        carry_bounds(
+            np.ascontiguousarray(path.capture_ns, dtype=np.int64), leader, pose, motion,
+            np.ascontiguousarray(path.measured), np.ascontiguousarray(wanted), row_of(terms), bounds,
+        )  # fmt: skip
     return bounds

@@ -13,13 +13,13 @@ from estimation.tracking.estimate import estimate_of
 from estimation.tracking.track_point import JumpUncertainty
 from formation.kernel import kernel
 from formation.pose import Pose
-from formation.records import Rows, load, size, store
+from formation.records import Flags, Indices, Matrix, Rows, store
 
 _NS = 1e-9
 
 
 class Moment(NamedTuple):
-    """The truth at one capture; ``wanted``: whether the bound is to be mapped to the quantities here."""
+    """The truth at one capture; ``wanted``: whether the bound here is asked for."""
 
     capture_ns: int
     leader: State
@@ -28,6 +28,17 @@ class Moment(NamedTuple):
     u2: float
     measured: bool
     wanted: bool
+
+
+class Path(NamedTuple):
+    """The truth at n captures: x, y, vx, vy, u of the leader, pose and motion of the follower, and flags."""
+
+    capture_ns: Indices
+    leader: Matrix
+    follower: Matrix
+    motion: Matrix
+    measured: Flags
+    wanted: Flags
 
 
 class Terms(NamedTuple):
@@ -41,7 +52,7 @@ class Terms(NamedTuple):
 
 
 class Least(NamedTuple):
-    """Bound after one capture: of the state, and the least variances of the quantities where wanted."""
+    """Bound after one capture: of the state, and the least variances of the quantities."""
 
     known: bool
     state: Gaussian
@@ -53,8 +64,8 @@ class Least(NamedTuple):
 
 
 @kernel(inline=False)
-def carry(moments: Rows[Moment], terms: Terms, bounds: Rows[Least]) -> None:
-    """Fill the bound after every moment.
+def carry(path: Path, terms: Terms, bounds: Rows[Least]) -> None:
+    """Fill the bound after every moment that is wanted of a path that has some.
 
     It starts as the filters do, at the first measurement with what the limits say in advance; before it there
     is none.
@@ -62,9 +73,9 @@ def carry(moments: Rows[Moment], terms: Terms, bounds: Rows[Least]) -> None:
     variance = terms.pose.position * terms.pose.position
     spread, known = Spread(variance, 0.0, variance), False
     belief = started(0.0, 0.0, spread, terms.limits)
-    before = load(Moment, moments, 0)
-    for k in range(size(moments)):
-        moment = load(Moment, moments, k)
+    before, filled = _moment(path, 0), 0
+    for k in range(len(path.capture_ns)):
+        moment = _moment(path, k)
         if known:
             dt = (moment.capture_ns - before.capture_ns) * _NS
             belief = extended_moved(_at(belief, before.leader), dt, terms.noise)
@@ -74,11 +85,25 @@ def carry(moments: Rows[Moment], terms: Terms, bounds: Rows[Least]) -> None:
             known = True
             belief = started(moment.leader.x, moment.leader.y, spread, terms.limits)
         belief = _at(belief, moment.leader)
-        least = Least(known, belief, math.inf, math.inf, math.inf, math.inf, math.inf)
-        if known and moment.wanted:
-            least = _mapped(belief, moment, terms)
-        store(bounds, k, least)
+        if moment.wanted:
+            least = Least(known, belief, math.inf, math.inf, math.inf, math.inf, math.inf)
+            store(bounds, filled, _mapped(belief, moment, terms) if known else least)
+            filled += 1
         before = moment
+
+
+@kernel
+def _moment(path: Path, k: int) -> Moment:
+    leader, pose, motion = path.leader, path.follower, path.motion
+    return Moment(
+        path.capture_ns[k],
+        State(leader[k, 0], leader[k, 1], leader[k, 2], leader[k, 3], leader[k, 4]),
+        Pose(pose[k, 0], pose[k, 1], pose[k, 2]),
+        motion[k, 0],
+        motion[k, 1],
+        path.measured[k],
+        path.wanted[k],
+    )
 
 
 @kernel

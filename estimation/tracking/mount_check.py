@@ -41,6 +41,7 @@ class MountCheck(NamedTuple):
 
     ``begun``, ``since_ns``, ``since``: the arc under way. Of each arc ``ahead`` [m] along the mean heading,
     ``turn`` [rad] and ``aside`` [m] across, in standard deviations of the latter; ``arcs``: their number.
+    ``off``: whether by them the robot must not be driven by its heading.
     """
 
     begun: bool
@@ -53,9 +54,10 @@ class MountCheck(NamedTuple):
     turn_aside: float
     aside_aside: float
     arcs: float
+    off: bool
 
 
-NO_MOUNT_CHECK = MountCheck(False, 0, Pose(0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_MOUNT_CHECK = MountCheck(False, 0, Pose(0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, off=False)
 
 
 class MountLeft(NamedTuple):
@@ -111,7 +113,7 @@ def _with_arc(check: MountCheck, pose: Pose, turn: float, noise: PoseNoise) -> M
     far = abs(off) / (_OUTLIER * math.sqrt(left.usual))
     weight = 1.0 if far <= 1.0 else 1.0 / far
     share = weight / variance
-    return check._replace(
+    check = check._replace(
         ahead_ahead=_MEMORY * check.ahead_ahead + share * ahead * ahead,
         ahead_turn=_MEMORY * check.ahead_turn - share * ahead * bend,
         turn_turn=_MEMORY * check.turn_turn + share * bend * bend,
@@ -120,6 +122,9 @@ def _with_arc(check: MountCheck, pose: Pose, turn: float, noise: PoseNoise) -> M
         aside_aside=_MEMORY * check.aside_aside + share * aside * aside,
         arcs=_MEMORY * check.arcs + 1.0,
     )
+    # Once for an arc: it is asked at every estimate.
+    left = mount_left(check)
+    return check._replace(off=left.known and surely_above(left.yaw, left.sd_yaw, MOST_YAW))
 
 
 @kernel
@@ -149,10 +154,3 @@ def mount_left(check: MountCheck) -> MountLeft:
 def surely_above(value: float, sd: float, limit: float) -> bool:
     """Whether something is larger than a limit either way, beyond doubt."""
     return abs(value) - _SURE * sd > limit
-
-
-@kernel
-def is_off(check: MountCheck) -> bool:
-    """Whether the robot must not be driven by its heading."""
-    left = mount_left(check)
-    return left.known and surely_above(left.yaw, left.sd_yaw, MOST_YAW)

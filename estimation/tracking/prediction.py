@@ -131,16 +131,18 @@ def _follower_at(sight: Sight, commands: Rows[SentCommand], sent: Ring, until_ns
     """Where the follower will be, seen from where it was at the capture."""
     at, v, u = Course(0.0, 0.0, 1.0, 0.0), sight.v2, sight.u2
     goal_v, goal_u = v, u
-    at_ns, arc = sight.capture_ns, Arc(0, 0, 0.0, 0.0, 0.0)
+    at_ns, arc, spare = sight.capture_ns, Arc(0, 0, 0.0, 0.0, 0.0), Arc(0, 0, 0.0, 0.0, 0.0)
     for k in range(sent.length + 1):
         end_ns, next_v, next_u = until_ns, goal_v, goal_u
         if k < sent.length:
             command = load(SentCommand, commands, place(sent, commands, k))
             end_ns, next_v, next_u = min(command.from_ns, until_ns), command.v, command.u
         if end_ns > at_ns:
-            # The exponential is most of the work, and commands mostly come evenly.
+            # The exponential is most of the work, and commands mostly come evenly, give or take a nanosecond.
             if end_ns - at_ns != arc.span_ns:
-                arc = _arc_of(end_ns - at_ns, lag)
+                arc, spare = spare, arc
+                if end_ns - at_ns != arc.span_ns:
+                    arc = _arc_of(end_ns - at_ns, lag)
             for _ in range(arc.pieces):
                 off_v, off_u = v - goal_v, u - goal_u
                 at = along(at, goal_v + off_v * arc.mean, goal_u + off_u * arc.mean, arc.step)

@@ -13,8 +13,9 @@ from estimation.filters.gaussian import Gaussian
 from estimation.models.measurement import Measurement
 from estimation.tracking import tracker
 from estimation.tracking.track_point import TrackPoint, Verdict, begun
-from estimation.tracking.tracker import Status, TrackSettings
-from formation.records import Rows, load, plain_rows_of
+from estimation.tracking.track_settings import TrackSettings
+from estimation.tracking.tracker import Status
+from formation.records import Rows, load, plain_rows_of, store
 from formation.ring import Ring
 
 Track = tuple[TrackPoint, ...]
@@ -38,9 +39,10 @@ class Tracker:
 
     def follow(self, last: TrackPoint, measurement: Measurement) -> TrackPoint:
         """Fold one measurement, newer than the point, into it; see :func:`.tracker.fold`."""
-        point = plain_rows_of(TrackPoint, 1)
-        tracker.fold(point, 0, last, measurement, self.settings, self.estimator)
-        return load(TrackPoint, point, 0)
+        points = plain_rows_of(TrackPoint, 2)
+        store(points, 0, last)
+        tracker.fold(points, 0, 1, measurement, self.settings, self.estimator)
+        return load(TrackPoint, points, 1)
 
     def add(self, track: Track, measurement: Measurement) -> tuple[Track, Verdict]:
         """Fold a measurement in at its place in time; see :func:`estimation.tracking.tracker.add`."""

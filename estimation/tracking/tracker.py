@@ -43,6 +43,7 @@ from estimation.tracking.track_point import (
     no_tentative,
     way_to,
 )
+from estimation.tracking.track_settings import TrackSettings
 from formation.kernel import kernel
 from formation.records import Rows, load, size, store
 from formation.ring import Ring, place
@@ -74,45 +75,12 @@ REJECTING = Status.REJECTING.value
 LOST = Status.LOST.value
 
 
-class TrackSettings(NamedTuple):
-    """When to believe a measurement and when to believe the estimate.
-
-    gate_probability: share of good measurements that pass a chi-square gate.
-    reacquire_frames: rejected measurements that must agree with each other before they take over.
-    coast_after, lost_after, window: [s]; a track of slow measurements has some of their intervals.
-    jump_uncertain_for: how long [s] a jump stays uncertain.
-    settled_heading, unsettled_heading: standard deviation of the leader's direction [rad] below which a track
-    settles, and above which it no longer counts as settled.
-    capped_speed: whether a leader that seems faster than k_v settles as one of k_v would.
-    followed_turn: how far [rad] a jump may turn alpha1 and alpha2 for the track to follow it.
-    notices_manoeuvres: whether a run of innovations raises the process noise.
-    """
-
-    gate_probability: float = 0.9999
-    reacquire_frames: int = 5
-    coast_after: float = 0.25
-    lost_after: float = 1.0
-    window: float = 0.2
-    jump_uncertain_for: float = 2.0
-    settled_heading: float = 0.35
-    unsettled_heading: float = 0.6
-    capped_speed: bool = True
-    followed_turn: float = 0.25
-    notices_manoeuvres: bool = False
-
-
 class Added(NamedTuple):
     """Ring with a measurement in it, and what became of this: verdict and cause."""
 
     ring: Ring
     verdict: int
     cause: int
-
-
-@kernel
-def gate_of(settings: TrackSettings) -> float:
-    """Chi-square quantile of the gate; with two degrees of freedom it has this closed form."""
-    return -2.0 * math.log1p(-settings.gate_probability)
 
 
 @kernel
@@ -154,25 +122,25 @@ def status_of(point: TrackPoint, now_ns: int, settings: TrackSettings) -> int:
 @kernel
 def fold(
     points: Rows[TrackPoint],
+    before: int,
     row: int,
-    last: TrackPoint,
     measurement: Measurement,
     settings: TrackSettings,
     estimator: Filter,
 ) -> None:
-    """Fold one measurement, newer than the point ``last``, into that; the point of it goes into a row.
+    """Fold one measurement, newer than the point in row ``before``, into that; its point goes into ``row``.
 
     It is used if the leader passes the gate and the frame its checks. If not, it joins the tentative track,
     which takes over when enough measurements agree and the jump is small against the distance: more than
     that no robot does, and it has time until the track is lost.
     """
-    capture_ns, full_gate = measurement.capture_ns, gate_of(settings)
-    found = _checked(last, measurement, full_gate, estimator)
+    last, capture_ns = load(TrackPoint, points, before), measurement.capture_ns
+    found = _checked(last, measurement, settings.gate, estimator)
     if (capture_ns - last.used_ns) * _NS > lost_after(last, settings):
-        store(points, row, _found(last, measurement, found, settings, estimator))
+        store(points, row, _found(points, before, measurement, found, settings, estimator))
         return
     # Nothing passes a negative gate: the belief is then the prediction.
-    gate = full_gate if found.cause == BELIEVED else -1.0
+    gate = settings.gate if found.cause == BELIEVED else -1.0
     dt = (capture_ns - last.measurement.capture_ns) * _NS
     way = way_to(last, measurement, found.cause == BELIEVED, dt)
     followed = followed_leader(last, measurement, way, gate, settings.notices_manoeuvres, estimator)
@@ -197,17 +165,21 @@ def fold(
     # Stored where it is made: points that come together from several ways would be moved about.
     store(points, row, point)
     if not stepped.nis <= gate:
-        store(points, row, _refused(point, last, settings, estimator))
+        store(points, row, _refused(points, before, row, settings, estimator))
 
 
 @kernel(inline=False)
-def _refused(point: TrackPoint, last: TrackPoint, settings: TrackSettings, estimator: Filter) -> TrackPoint:
+def _refused(
+    points: Rows[TrackPoint], before: int, row: int, settings: TrackSettings, estimator: Filter
+) -> TrackPoint:
     """Point of a measurement that was not used, or of the tentative track that takes over with it."""
+    # Seldom called, it loads both by itself: handed over, all of them would be loaded each time.
+    last, point = load(TrackPoint, points, before), load(TrackPoint, points, row)
     cause = LEADER_OFF if point.cause == BELIEVED else point.cause
     rejected = point._replace(verdict=GATED, used_ns=last.used_ns, cause=cause)
     if cause == FROZEN:
         return rejected
-    tentative = joined(last.tentative, point.measurement, estimator, gate_of(settings))
+    tentative = joined(last.tentative, point.measurement, estimator, settings.gate)
     return _taken_over(rejected._replace(tentative=tentative), settings, estimator)
 
 
@@ -228,13 +200,19 @@ def _checked(last: TrackPoint, measurement: Measurement, gate: float, estimator:
 
 @kernel(inline=False)
 def _found(
-    last: TrackPoint, measurement: Measurement, found: Checked, settings: TrackSettings, estimator: Filter
+    points: Rows[TrackPoint],
+    before: int,
+    measurement: Measurement,
+    found: Checked,
+    settings: TrackSettings,
+    estimator: Filter,
 ) -> TrackPoint:
     """Start anew after a loss: with the tentative track if it is ripe, unless the frame is plainly wrong.
 
     Flipped headings, swapped bodies and frozen ones no real motion has. What was lost is not moved on, so
     that a body that stays frozen leads nowhere.
     """
+    last = load(TrackPoint, points, before)
     if found.cause == FLIPPED or found.cause == SWAPPED or found.cause == FROZEN:
         return last._replace(
             measurement=measurement,
@@ -248,7 +226,7 @@ def _found(
     # One that was lost for being slow is to be given the time that it takes.
     apart = (measurement.capture_ns - last.measurement.capture_ns) * _NS
     anew = begun(measurement, estimator)._replace(period=min(_SLOWEST, next_period(last.period, apart)))
-    tentative = joined(last.tentative, measurement, estimator, gate_of(settings))
+    tentative = joined(last.tentative, measurement, estimator, settings.gate)
     if tentative.frames < settings.reacquire_frames:
         return anew._replace(tentative=tentative)
     leader = estimator.leader(tentative.belief, measurement)
@@ -266,7 +244,7 @@ def _taken_over(rejected: TrackPoint, settings: TrackSettings, estimator: Filter
     tentative, measurement = rejected.tentative, rejected.measurement
     if tentative.frames < settings.reacquire_frames:
         return rejected
-    prior, leader_fits = rejected.belief, rejected.nis <= gate_of(settings)
+    prior, leader_fits = rejected.belief, rejected.nis <= settings.gate
     jump = jumped(rejected.jump, measurement, prior, rejected.check, leader_fits)
     if line_turn(jump, measurement) > settings.followed_turn:
         return rejected
@@ -328,11 +306,11 @@ def add(
     n = ring.length
     if n == 0 or measurement.capture_ns < capture_at(points, ring, n - 1) + SAME_NS:
         return _inserted(points, ring, measurement, settings, estimator)
-    last = point_at(points, ring, n - 1)
+    before = place(ring, points, n - 1)
     if n == size(points):
         ring, n = Ring(place(ring, points, 1), n - 1), n - 1
     row = place(ring, points, n)
-    fold(points, row, last, measurement, settings, estimator)
+    fold(points, before, row, measurement, settings, estimator)
     point = load(TrackPoint, points, row)
     return Added(trimmed(points, Ring(ring.first, n + 1), settings), point.verdict, point.cause)
 
@@ -394,6 +372,6 @@ def reprocessed(
     first = max(k, 1)
     for at in range(first, ring.length):
         # By the noise that it had: what has been learned since is not for it.
-        last, old, row = point_at(points, ring, at - 1), point_at(points, ring, at), place(ring, points, at)
-        fold(points, row, last, old.measurement, settings, estimator.driven_by(old.noise))
+        before, row, old = place(ring, points, at - 1), place(ring, points, at), point_at(points, ring, at)
+        fold(points, before, row, old.measurement, settings, estimator.driven_by(old.noise))
     return ring.length - first

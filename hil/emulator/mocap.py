@@ -74,7 +74,13 @@ class Delivery(NamedTuple):
     @kernel
     def time_on_the_way(self, shares: Shares) -> float:
         """How long a frame is on its way [s]."""
+        if self.jitter == 0.0:
+            return self.latency
         return self.latency - self.jitter * math.log1p(-shares.late)
+
+    def varies(self) -> bool:
+        """Whether anything depends on a frame's shares."""
+        return self.jitter != 0.0 or self.loss > 0.0
 
     @kernel
     def loses(self, shares: Shares) -> bool:

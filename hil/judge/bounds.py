@@ -84,7 +84,10 @@ def named_bounds(scenario: Scenario, columns: Columns, given: WorstErrors) -> di
         station=station(scenario),
     )
     n = len(columns.samples.capture_ns)
-    return {name: np.broadcast_to(bound, (n,)) for name, bound in bounds.items()}
+    return {
+        name: bound if np.shape(bound) == (n,) else np.broadcast_to(bound, (n,))
+        for name, bound in bounds.items()
+    }
 
 
 def worst_errors(scenario: Scenario, columns: Columns) -> WorstErrors:
@@ -94,7 +97,7 @@ def worst_errors(scenario: Scenario, columns: Columns) -> WorstErrors:
     """
     errors = actual_errors(columns)
     largest: dict[str, Values] = {
-        name: _largest(error) for name, error in errors.items() if not np.all(np.isnan(error))
+        name: greatest for name, error in errors.items() if not math.isnan(greatest := _largest(error))
     }
     if len(largest) < len(errors):
         largest = assumed_errors(scenario, columns.samples) | largest
@@ -102,9 +105,12 @@ def worst_errors(scenario: Scenario, columns: Columns) -> WorstErrors:
 
 
 def _largest(error: FloatArray) -> float:
-    """Largest error that is known."""
-    largest = float(np.max(error))
-    return float(np.nanmax(error)) if math.isnan(largest) else largest
+    """Largest error that is known, NaN where none is."""
+    largest = float(error.max())
+    if not math.isnan(largest):
+        return largest
+    known = error[~np.isnan(error)]
+    return float(known.max()) if len(known) else math.nan
 
 
 def actual_errors(columns: Columns) -> dict[str, FloatArray]:

@@ -78,10 +78,14 @@ class EstimateColumns:
             computed_ns=_in_order(rows["capture_ns"], rows["computed_ns"]),
         )
 
-    def only(self, rows: NDArray[np.bool_]) -> EstimateColumns:
-        """The estimates in the given rows."""
-        if np.all(rows):
+    def only(self, among: NDArray[np.bool_]) -> EstimateColumns:
+        """The estimates in the given rows, as a view where none is left out in between."""
+        if among.all():
             return self
+        rows: NDArray[np.bool_] | slice = among
+        places = np.flatnonzero(among)
+        if len(places) and places[-1] - places[0] == len(places) - 1:
+            rows = slice(int(places[0]), int(places[-1]) + 1)
         seen = Perceived(*(np.asarray(getattr(self.seen, name))[rows] for name in _SEEN))
         return EstimateColumns(
             capture_ns=self.capture_ns[rows],

@@ -12,6 +12,16 @@ from numpy.typing import NDArray
 
 from formation.angles import FloatArray, wrap
 from formation.mount import Mount, is_aligned
+from hil.judge.true_shapes import (
+    ALPHA1,
+    FOLLOWER_THETA,
+    FOLLOWER_X,
+    FOLLOWER_Y,
+    LEADER_THETA,
+    LEADER_X,
+    LEADER_Y,
+    RHO,
+)
 from hil.wire.message_types import Truth
 from hil.wire.messages import to_ns
 
@@ -23,7 +33,7 @@ Stamps = NDArray[np.int64]
 _POSES = ("leader_x", "leader_y", "leader_theta", "follower_x", "follower_y", "follower_theta")
 _RECORDED = attrgetter(*_POSES, "v1", "u1", "v2", "u2")
 _RECORDED_SIZE, _SHAPE_SIZE = 10, 5
-_HEADINGS, _V1 = [2, 5], 6
+_HEADINGS = [LEADER_THETA, FOLLOWER_THETA]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,6 +122,21 @@ class TrueStates:
         return np.column_stack([self.leader, self.follower, *motions, *shapes])
 
 
+def run_of(moments_ns: Stamps, wanted_ns: Stamps) -> slice | None:
+    """Where wanted moments lie among increasing ones, if there one after the other and all of them.
+
+    That is so where nothing was lost, and spares a search for each of them.
+
+    >>> run_of(np.array([3, 5, 8, 9]), np.array([5, 8]))
+    slice(1, 3, None)
+    """
+    if not len(wanted_ns):
+        return None
+    first = int(np.searchsorted(moments_ns, wanted_ns[0]))
+    place = slice(first, first + len(wanted_ns))
+    return place if np.array_equal(moments_ns[place], wanted_ns) else None
+
+
 def _states(moments_ns: Stamps, rows: FloatArray) -> TrueStates:
     return TrueStates(moments_ns, rows[:, 0:3], rows[:, 3:6], *rows[:, 6:].T)
 
@@ -122,23 +147,15 @@ def _with_shape(recorded: FloatArray) -> FloatArray:
     NaN where both robots are in one place: there is no shape. A leader that drives backwards is turned round,
     as its alpha1 is that of its direction of travel.
     """
+    from hil.judge.entries import fill_shapes  # compiles, which who only needs the records is spared
+
     # Column by column in memory: everything that follows works on columns.
-    rows = np.empty((_RECORDED_SIZE + _SHAPE_SIZE, len(recorded))).T
-    rows[:, :_RECORDED_SIZE] = recorded
-    backwards = rows[:, _V1] < 0.0
-    if np.any(backwards):
-        rows[backwards, _HEADINGS[0]] += math.pi
-        rows[backwards, _V1] *= -1.0
-    for heading in _HEADINGS:
-        rows[:, heading] = wrap(rows[:, heading])
-    lx, ly, ltheta, fx, fy, ftheta, v1, _, v2, u2 = rows.T[:_RECORDED_SIZE]
-    dx, dy = fx - lx, fy - ly
-    rho, line = np.hypot(dx, dy), np.arctan2(dy, dx)
-    rho = np.where(rho > 0.0, rho, math.nan)
-    apart = 0.0 * rho
-    alpha1, alpha2 = wrap(line - ltheta) + apart, wrap(line + math.pi - ftheta) + apart
-    turning = (v1 * np.sin(alpha1) + v2 * np.sin(alpha2)) / rho
-    rho_dot = -v1 * np.cos(alpha1) - v2 * np.cos(alpha2)
-    for column, values in enumerate((rho, alpha1, alpha2, rho_dot, turning - u2), _RECORDED_SIZE):
-        rows[:, column] = values
-    return rows
+    columns = np.empty((_RECORDED_SIZE + _SHAPE_SIZE, len(recorded)))
+    columns[:_RECORDED_SIZE] = recorded.T
+    dx = columns[FOLLOWER_X] - columns[LEADER_X]
+    dy = columns[FOLLOWER_Y] - columns[LEADER_Y]
+    np.hypot(dx, dy, out=columns[RHO])
+    columns[RHO, ~(columns[RHO] > 0.0)] = math.nan
+    np.arctan2(dy, dx, out=columns[ALPHA1])
+    fill_shapes(columns)
+    return columns.T

@@ -243,10 +243,10 @@ class Flyer:
         lab, n = self.rooms.lab, self.followers + 1
         normals = _numbers(lab.normals).reshape(self._frame_blocks, -1)
         shares = _numbers(lab.shares).reshape(self._frame_blocks, -1)
+        nothing, varies = np.empty(0), self._plan.lab.delivery.varies()
         for block in range(self._frame_blocks):
-            draw_into(normals[block], shares[block], seed, Stream.MOCAP, block)
+            draw_into(normals[block], shares[block] if varies else nothing, seed, Stream.MOCAP, block)
         odometry = _numbers(lab.odometry_normals).reshape(n, self._sample_blocks, -1)
-        nothing = np.empty(0)
         for robot in range(n):
             for block in range(self._sample_blocks):
                 draw_into(odometry[robot, block], nothing, seed, Stream.LEADER_ODOMETRY + robot, block)

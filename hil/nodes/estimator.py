@@ -17,7 +17,6 @@ from estimation.own_motion.odometry_correction import (
 from estimation.own_motion.odometry_history import MotionSample
 from estimation.time.host_time import HostTime
 from estimation.tracking.estimate import Estimate
-from estimation.tracking.mount_check import is_off
 from estimation.tracking.sideways_check import NO_SIDEWAYS_CHECK, SidewaysCheck, with_ways
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE
 from formation.records import load
@@ -271,7 +270,7 @@ class EstimatorNode:
         stops = self.rules.step.mounts.stops
         problem = problem or mount_problem(known.mount_check, stops=stops)
         values: dict[str, object] = {"status": state.memory.status(now_ns).name.lower()}
-        if stops and values["status"] in ("tracking", "initialising") and is_off(known.mount_check):
+        if stops and values["status"] in ("tracking", "initialising") and known.mount_check.off:
             values["status"] = "rejecting"
         values |= mount_report(known.mount_check, state.leader_mount.check, state.sideways)
         values |= clock_report(state.times, state.memory.desk.time)

@@ -17,7 +17,7 @@ from estimation.own_motion.own_track import OwnNoise, OwnPoint
 from estimation.tracking.estimate import Estimate
 from estimation.tracking.mount_check import MountCheck
 from estimation.tracking.track_point import TrackPoint
-from estimation.tracking.tracker import TrackSettings
+from estimation.tracking.track_settings import TrackSettings
 from estimation.tracking.travel_watch import TravelWatch
 from formation.mount import NO_MOUNT, Mount
 from formation.records import Rows

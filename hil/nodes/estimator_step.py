@@ -42,7 +42,7 @@ from estimation.tracking.estimate import estimate_at, guessed_when_slow
 from estimation.tracking.follower_check import BELIEVED, MOUNT
 from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
 from estimation.tracking.follower_check import GATED as LEADER_OFF
-from estimation.tracking.mount_check import MountCheck, is_off, mount_checked
+from estimation.tracking.mount_check import MountCheck, mount_checked
 from estimation.tracking.track_point import DUPLICATE, GATED, LATE, RESTARTED, USED, TrackPoint, with_motion
 from estimation.tracking.tracker import (
     INITIALISING,
@@ -360,7 +360,7 @@ def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) 
     status, cause = status_of(point, now_ns, rules.settings), point.cause
     # A leader that stands need not be waited for while the follower must not be driven anyway.
     waits = status in (TRACKING, INITIALISING)
-    if waits and rules.mounts.stops and is_off(known.mount_check):
+    if waits and rules.mounts.stops and known.mount_check.off:
         status, cause = REJECTING, MOUNT
     point = point._replace(belief=rules.filter.told_speed(point.belief))
     return Told(guessed_when_slow(estimate_at(point, status), rules.filter.limits.v_eps), cause)

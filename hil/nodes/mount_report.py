@@ -10,7 +10,6 @@ from estimation.tracking.mount_check import (
     NOTED_YAW,
     MountCheck,
     MountLeft,
-    is_off,
     mount_left,
     surely_above,
 )
@@ -21,7 +20,7 @@ _DEGREES, _MILLIMETRES = 180.0 / math.pi, 1e3
 
 def mount_problem(check: MountCheck, *, stops: bool) -> str:
     """Why the follower is not to be driven; empty if it may be."""
-    if not is_off(check):
+    if not check.off:
         return ""
     what = "stopped" if stops else "driven all the same, as controller.mount_check is 'warn'"
     return f"{_yaw_text(mount_left(check))}: {what}; calibrate its mount"

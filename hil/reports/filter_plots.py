@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
+from estimation.tracking.track_settings import gate_of
 from estimation.tracking.tracker import Status
 from formation.angles import FloatArray
 from hil.figures.plot_data import LONGEST_LINE, PlotData
@@ -79,7 +78,7 @@ def nis_panel(data: PlotData, axis: TimeAxis) -> Panel | None:
     if not np.any(known):
         return None
     t, nis = data.seconds(estimates.capture_ns[known]), estimates.nis[known]
-    gate = -2.0 * math.log1p(-data.run_data.scenario.estimator.gate_probability)
+    gate = gate_of(data.run_data.scenario.estimator.gate_probability)
     top = 1.25 * gate
     plot = axis.panel("NIS", (0.0, top))
     for level, colour, dash in ((_EXPECTED_NIS, GREY, "solid"), (gate, BOUND, "dashed")):

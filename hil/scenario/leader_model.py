@@ -13,7 +13,7 @@ from estimation.models.coordinated_turn import LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, PoseNoise
 from estimation.own_motion.odometry_history import InputTrust
 from estimation.own_motion.own_track import ODOMETRY_CORRELATION, TRACK_CORRELATION, OwnNoise
-from estimation.tracking.tracker import TrackSettings
+from estimation.tracking.track_settings import TrackSettings, gate_of
 from formation.mount import Mount
 from hil.errors import UsageError
 from hil.extensions.estimators import own_estimator
@@ -121,7 +121,7 @@ def track_settings(scenario: Scenario) -> TrackSettings:
         least = float(given.settled_heading)
         settled = settled._replace(settled_heading=least, unsettled_heading=least + 0.25)
     return TrackSettings(
-        gate_probability=given.gate_probability,
+        gate=gate_of(given.gate_probability),
         reacquire_frames=given.reacquire_frames,
         coast_after=float(given.coast_after_s),
         lost_after=float(given.lost_after_s),

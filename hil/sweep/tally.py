@@ -22,7 +22,7 @@ from hil.judge.estimation import WARM_UP_NS, estimate_errors, least_deviations
 from hil.judge.noise_free_orbit import NoiseFreeOrbit, noise_free_orbit
 from hil.judge.run_data import Span, judged_from_ns
 from hil.judge.side_orders import Order, desired_bearings
-from hil.judge.true_states import TrueStates
+from hil.judge.true_states import TrueStates, run_of
 from hil.lockstep.flyer import Flown, Flyer
 from hil.scenario.files import build_scenario, scenario_text, with_overrides
 from hil.scenario.links import links_of
@@ -101,10 +101,11 @@ def judge_run(
     for k, link in enumerate(links_of(scenario)):
         columns = columns_of_pair(link.scenario, flown, k)
         _add_estimates(tally, link.scenario, columns, flown)
-        _add_distances(tally, columns)
+        truth = _within(columns.truth, columns.span)
+        _add_distances(tally, truth)
         if k == 0:
-            _add_formation(tally, columns, allowed, orbit)
-            _add_station(tally, link.scenario, columns)
+            _add_formation(tally, truth, allowed, orbit)
+            _add_station(tally, link.scenario, truth)
     return tally
 
 
@@ -115,7 +116,8 @@ def columns_of_pair(scenario: Scenario, flown: Flown, k: int) -> Columns:
     judged = inside(estimates.capture_ns, span) & (estimates.status == Status.TRACKING)
     samples = estimates.only(judged)
     truth = true_states(flown, k, Span(span.from_ns - WARM_UP_NS, span.to_ns))
-    true = _rows(truth, np.searchsorted(truth.capture_ns, samples.capture_ns))
+    run = run_of(truth.capture_ns, samples.capture_ns)
+    true = _rows(truth, np.searchsorted(truth.capture_ns, samples.capture_ns) if run is None else run)
     return Columns(run_span(scenario), span, estimates, CommandColumns.of(()), truth, samples, true)
 
 
@@ -146,11 +148,8 @@ def _estimates(flown: Flown, k: int) -> EstimateColumns:
     )
 
 
-def _rows(truth: TrueStates, rows: NDArray[np.int64]) -> TrueStates:
-    taken: NDArray[np.int64] | slice = rows
-    if len(rows) and rows[-1] - rows[0] == len(rows) - 1 and np.all(np.diff(rows) == 1):
-        taken = slice(int(rows[0]), int(rows[-1]) + 1)  # where no frame was lost: that copies nothing
-    return TrueStates(**{name: getattr(truth, name)[taken] for name in TrueStates.__slots__})
+def _rows(truth: TrueStates, rows: NDArray[np.int64] | slice) -> TrueStates:
+    return TrueStates(**{name: getattr(truth, name)[rows] for name in TrueStates.__slots__})
 
 
 def _add_estimates(tally: NDArray[np.void], scenario: Scenario, columns: Columns, flown: Flown) -> None:
@@ -191,39 +190,41 @@ def _add_errors(tally: NDArray[np.void], columns: Columns, errors: dict[str, Flo
             tally["nees_sum"][0, k] += total
 
 
-def _add_distances(tally: NDArray[np.void], columns: Columns) -> None:
-    rho = columns.truth.rho[inside(columns.truth.capture_ns, columns.span)]
-    tally["rho_min"] = np.minimum(tally["rho_min"], rho.min())
-    tally["rho_max"] = np.maximum(tally["rho_max"], rho.max())
+def _within(truth: TrueStates, span: Span) -> TrueStates:
+    """The truth at the moments of a span, its ends included, as a view."""
+    first = np.searchsorted(truth.capture_ns, span.from_ns)
+    after = np.searchsorted(truth.capture_ns, span.to_ns, "right")
+    return _rows(truth, slice(int(first), int(after)))
+
+
+def _add_distances(tally: NDArray[np.void], truth: TrueStates) -> None:
+    tally["rho_min"] = np.minimum(tally["rho_min"], truth.rho.min())
+    tally["rho_max"] = np.maximum(tally["rho_max"], truth.rho.max())
 
 
 def _add_formation(
     tally: NDArray[np.void],
-    columns: Columns,
+    truth: TrueStates,
     allowed: tuple[float, float] | None,
     orbit: NoiseFreeOrbit | None,
 ) -> None:
-    truth = columns.truth
-    near = inside(truth.capture_ns, columns.span)
-    rho, alpha1 = truth.rho[near], truth.alpha1[near]
+    rho, alpha1 = truth.rho, truth.alpha1
     tally["moments"] = len(rho)
     if allowed is not None:
         tally["inside"] = np.count_nonzero((rho >= allowed[0]) & (rho <= allowed[1]))
     if orbit is None:
         tally["rho_off_sum"] = tally["alpha1_off_sum"] = math.nan
         return
-    orbit_rho, orbit_alpha1, _ = orbit.at(truth.capture_ns[near])
+    orbit_rho, orbit_alpha1, _ = orbit.at(truth.capture_ns)
     tally["rho_off_sum"] = np.sum((rho - orbit_rho) ** 2)
     tally["alpha1_off_sum"] = np.sum(wrap(alpha1 - orbit_alpha1) ** 2)
 
 
-def _add_station(tally: NDArray[np.void], scenario: Scenario, columns: Columns) -> None:
-    truth = columns.truth
-    near = inside(truth.capture_ns, columns.span)
+def _add_station(tally: NDArray[np.void], scenario: Scenario, truth: TrueStates) -> None:
     orders = [Order(round(at_s * 1e9), side) for at_s, side in ordered_sides(scenario)]
-    alpha1, _ = desired_bearings(scenario, orders, truth.capture_ns[near])
-    tally["rho_station_sum"] = np.sum((truth.rho[near] - scenario.formation.rho_0) ** 2)
-    tally["alpha1_station_sum"] = np.sum(wrap(truth.alpha1[near] - alpha1) ** 2)
+    alpha1, _ = desired_bearings(scenario, orders, truth.capture_ns)
+    tally["rho_station_sum"] = np.sum((truth.rho - scenario.formation.rho_0) ** 2)
+    tally["alpha1_station_sum"] = np.sum(wrap(truth.alpha1 - alpha1) ** 2)
 
 
 def orbit_of(scenario: Scenario) -> NoiseFreeOrbit | None:

@@ -46,3 +46,10 @@ def test_arrays_keep_their_shape() -> None:
 @pytest.mark.parametrize("angle", [math.nan, math.inf, -math.inf])
 def test_what_is_no_angle_gives_nan(angle: float) -> None:
     assert math.isnan(wrap(angle))
+
+
+def test_angles_that_are_in_range_come_back_as_another_array() -> None:
+    angles = np.array([0.5, -3.0])
+    found = wrap(angles)
+    found += 1.0
+    assert angles.tolist() == [0.5, -3.0]

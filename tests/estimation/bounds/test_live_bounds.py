@@ -77,14 +77,15 @@ def test_arrays_are_bounded_moment_by_moment_compiled_or_not(
     given_: list[tuple[Moment, ErrorBounds]], station: Station
 ) -> None:
     law = LawConstants.of(V_EPS, MU1, SPACING, station)
-    table = np.array([[*seen, *errors, V_EPS] for seen, errors in given_]).T.copy()
-    compiled, plain = np.empty((3, len(given_))), np.empty((3, len(given_)))
+    table = np.array([[*seen, V_EPS, *errors, *reversed(errors)] for seen, errors in given_]).T.copy()
+    compiled, plain = np.empty((6, len(given_))), np.empty((6, len(given_)))
     bound_all(table, row_of(law._replace(v_eps=7.0)), compiled)
     interpreted(bound_all)(table, row_of(law), plain)
     assert compiled.tobytes() == plain.tobytes()
-    assert [MomentBounds(*column) for column in plain.T.tolist()] == [
-        bounds_at(seen, errors, law) for seen, errors in given_
-    ]
+    for first, sets in ((0, [errors for _, errors in given_]), (3, [errors[::-1] for _, errors in given_])):
+        assert [MomentBounds(*column) for column in plain[first : first + 3].T.tolist()] == [
+            bounds_at(seen, ErrorBounds(*errors), law) for (seen, _), errors in zip(given_, sets, strict=True)
+        ]
 
 
 @pytest.mark.parametrize("shape", [(), (1,), (4,), (2, 3)])

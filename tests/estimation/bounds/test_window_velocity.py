@@ -15,7 +15,7 @@ from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, Pro
 from estimation.models.measurement import FrontEnd, Measurement, PoseNoise, measure_body, measure_world
 from estimation.tracking.track import Track, Tracker
 from estimation.tracking.track_point import TrackPoint
-from estimation.tracking.tracker import TrackSettings
+from estimation.tracking.track_settings import TrackSettings
 from formation.pose import Pose
 from formation.records import Rows
 from formation.ring import Ring

@@ -15,7 +15,7 @@ from estimation.filters.estimators import ESTIMATORS, make_estimator, settling
 from estimation.filters.gaussian import Gaussian
 from estimation.models.measurement import FrontEnd
 from estimation.tracking.track import Tracker
-from estimation.tracking.tracker import TrackSettings
+from estimation.tracking.track_settings import TrackSettings
 
 
 @pytest.mark.parametrize("sensor", SENSORS, ids=lambda sensor: str(sensor.name))

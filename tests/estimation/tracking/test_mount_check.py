@@ -14,7 +14,6 @@ from estimation.tracking.mount_check import (
     NOTED_PLACE,
     NOTED_YAW,
     MountCheck,
-    is_off,
     mount_checked,
     mount_left,
     surely_above,
@@ -71,7 +70,7 @@ def test_a_heading_that_must_not_be_driven_by_is_found_within_five_seconds(degre
     for seed in range(10):
         check = checked(drive(Mount(0.0, 0.0, math.radians(degrees)), 5.0, seed))
         left = mount_left(check)
-        assert is_off(check)
+        assert check.off
         assert abs(left.yaw - math.radians(degrees)) < 4.0 * left.sd_yaw
 
 
@@ -108,7 +107,7 @@ def test_noise_that_is_ten_times_what_was_told_makes_it_uncertain_and_not_wrong(
         check = NO_MOUNT_CHECK
         for at_ns, pose in drive(Mount(0.0, 0.0, 0.0), 20.0, seed, noise=loud):
             check = mount_checked(check, at_ns, pose, NOISE, False)
-            assert not is_off(check)
+            assert not check.off
 
 
 def test_steps_of_the_motion_capture_are_not_taken_for_a_mount() -> None:
@@ -122,18 +121,18 @@ def test_steps_of_the_motion_capture_are_not_taken_for_a_mount() -> None:
                 aside, turned = np.zeros(2), 0.0
             moved = Pose(pose.x + aside[0], pose.y + aside[1], wrapped(pose.theta + turned))
             check = mount_checked(check, at_ns, moved, NOISE, False)
-            assert not is_off(check)
+            assert not check.off
 
 
 def test_a_body_that_is_knocked_aside_is_noticed_and_a_robot_that_stands_forgets_nothing() -> None:
     before = drive(Mount(0.0, 0.0, 0.0), 20.0)
     after = drive(Mount(0.0, 0.0, math.radians(20.0)), 40.0, seed=1)
     check = checked(before)
-    assert not is_off(check)
+    assert not check.off
     offset_ns, place = before[-1][0] + 10**9, after[0][1]
     for at_ns, pose in after:
         check = mount_checked(check, offset_ns + at_ns, pose, NOISE, False)
-    assert is_off(check)
+    assert check.off
     still = check
     for k in range(1200):
         still = mount_checked(still, offset_ns + 41 * 10**9 + k * 8_333_333, place, NOISE, False)
@@ -154,7 +153,7 @@ def test_an_arc_begins_anew_after_a_jump_and_after_a_gap() -> None:
 
 def test_the_limit_is_one_of_the_heading_that_is_left() -> None:
     for degrees, off in ((4.0, False), (8.0, True)):
-        assert is_off(checked(drive(Mount(0.0, 0.0, math.radians(degrees)), 30.0))) is off
+        assert checked(drive(Mount(0.0, 0.0, math.radians(degrees)), 30.0)).off is off
     assert math.radians(4.0) < MOST_YAW < math.radians(8.0)
 
 
@@ -165,7 +164,7 @@ def all_watched(rows: Rows[MountCheck], poses: Rows[Pose], count: int) -> bool:
     for k in range(count):
         check = mount_checked(check, k * 10_000_000, load(Pose, poses, k), PoseNoise(3e-4, 3.5e-3), False)
     store(rows, 0, check)
-    return is_off(check)
+    return check.off
 
 
 def test_compiled_and_plain_agree_to_the_last_bit() -> None:
@@ -178,5 +177,5 @@ def test_compiled_and_plain_agree_to_the_last_bit() -> None:
     check = NO_MOUNT_CHECK
     for k, pose in enumerate(seen):
         check = mount_checked(check, k * 10_000_000, pose, NOISE, False)
-    assert off == is_off(check)
+    assert off == check.off
     same_bits(load(MountCheck, rows, 0), check)

@@ -162,6 +162,17 @@ def test_short_arcs_leave_nothing_of_that() -> None:
     assert_close(found, integrated(estimate(), commands[:1], NOW_NS + 150 * MS, 0.1), 1e-7)
 
 
+@pytest.mark.parametrize("apart_ms", [(8, 8, 12), (8, 12, 16), (5, 8, 5, 40)])
+def test_commands_that_come_in_turns_after_different_times_act_for_their_own(
+    apart_ms: tuple[int, ...],
+) -> None:
+    moments_ns = [NOW_NS + MS * sum((apart_ms * 6)[:k]) for k in range(12)]
+    commands = [SentCommand(ns, 0.2 - 0.02 * (k % 5), 1.5 - 0.4 * (k % 7)) for k, ns in enumerate(moments_ns)]
+    until_ns = moments_ns[-1] + 8 * MS
+    found = predict_shape(estimate(), commands, until_ns, 0.1)
+    assert_close(found, integrated(estimate(), commands, until_ns, 0.1), 2e-5)
+
+
 def test_before_the_capture_nothing_is_predicted() -> None:
     for until_ns in (NOW_NS, NOW_NS - 500 * MS):
         assert_close(predict_shape(estimate(), [], until_ns, 0.1), Shape(0.3, -1.3, 1.2), 1e-15)

@@ -22,7 +22,8 @@ from estimation.tracking.estimate import estimate_of
 from estimation.tracking.smoother import smooth
 from estimation.tracking.track import Tracker
 from estimation.tracking.track_point import NO_JUMP, TrackPoint, Verdict
-from estimation.tracking.tracker import Status, TrackSettings
+from estimation.tracking.track_settings import TrackSettings, gate_of
+from estimation.tracking.tracker import Status
 from formation.angles import wrap
 from formation.pose import Pose, advance
 from formation.shape import shape_of
@@ -113,7 +114,7 @@ def test_without_turning_it_is_the_textbook_smoother() -> None:
     positions = np.outer(DT * np.arange(60), [0.2, -0.1]) + 1e-3 * generator.standard_normal((60, 2))
     noise = 1e-6 * np.eye(2)
     seen = [Measurement.at(k * DT_NS, at, noise, STANDING) for k, at in enumerate(positions)]
-    points = smooth(Tracker(ExtendedFilter(model), TrackSettings(gate_probability=1.0 - 1e-12)), seen)
+    points = smooth(Tracker(ExtendedFilter(model), TrackSettings(gate=gate_of(1.0 - 1e-12))), seen)
     # The same as one least-squares problem over the whole path, solved at once.
     move = np.kron([[1.0, DT], [0.0, 1.0]], np.eye(2))
     drive = np.kron(9e-4 * np.array([[DT**3 / 3.0, DT**2 / 2.0], [DT**2 / 2.0, DT]]), np.eye(2))

@@ -24,17 +24,8 @@ from estimation.tracking.estimate import Estimate, estimate_at
 from estimation.tracking.follower_check import Cause
 from estimation.tracking.track import Track, Tracker
 from estimation.tracking.track_point import SAME_NS, JumpUncertainty, TrackPoint, Verdict, with_motion
-from estimation.tracking.tracker import (
-    Status,
-    TrackSettings,
-    add,
-    capture_at,
-    gate_of,
-    place_of,
-    point_at,
-    reprocessed,
-    status_of,
-)
+from estimation.tracking.track_settings import TrackSettings, gate_of
+from estimation.tracking.tracker import Status, add, capture_at, place_of, point_at, reprocessed, status_of
 from formation.angles import wrap
 from formation.pose import Motion, Pose, advance
 from formation.records import rows_of, store
@@ -404,7 +395,7 @@ def test_a_follower_may_be_off_by_what_its_noise_and_motion_leave_in_any_directi
 
 @pytest.mark.parametrize("share", [0.5, 0.99, 0.9999])
 def test_the_gate_lets_its_share_of_good_measurements_pass(share: float) -> None:
-    assert gate_of(TrackSettings(gate_probability=share)) == pytest.approx(chi2.ppf(share, 2), rel=1e-9)
+    assert gate_of(share) == pytest.approx(chi2.ppf(share, 2), rel=1e-9)
 
 
 @pytest.mark.parametrize(

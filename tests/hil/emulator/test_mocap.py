@@ -55,6 +55,9 @@ def test_delay_is_the_latency_and_an_exponential_jitter() -> None:
     assert kstest((delays - 0.03) / 0.02, "expon").pvalue > UNLIKELY
     steady = Delivery(latency=0.03, jitter=0.0, loss=0.0)
     assert {steady.time_on_the_way(each) for each in shares(4)} == {0.03}
+    assert not steady.varies()
+    assert steady._replace(jitter=0.02).varies()
+    assert steady._replace(loss=0.1).varies()
 
 
 def test_the_share_of_lost_frames_is_as_ordered_and_unrelated_to_their_delay() -> None:

@@ -8,10 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from formation.kernel import interpreted
 from formation.mount import NO_MOUNT, Mount, body_pose
 from formation.pose import Pose
+from hil.judge.entries import fill_shapes
 from hil.judge.run_data import RunData
-from hil.judge.true_states import LONGEST_GAP_NS, TrueStates
+from hil.judge.true_states import LONGEST_GAP_NS, TrueStates, run_of
 from hil.wire.message_types import Truth
 from hil.wire.messages import header, to_ns
 
@@ -106,3 +108,25 @@ def test_truth_of_bodies_becomes_that_of_the_robots_below() -> None:
     for name in ("leader", "follower", "v1", "u1", "v2", "u2", "rho", "alpha1", "alpha2", "rho_dot"):
         np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), atol=1e-12)
     assert wanted.of_robots(NO_MOUNT, NO_MOUNT) is wanted
+
+
+def test_shapes_are_filled_in_to_the_same_bits_compiled_or_not() -> None:
+    columns = np.random.default_rng(4).normal(scale=4.0, size=(15, 200))
+    columns[10] = np.abs(columns[10])
+    columns[10, :3] = math.nan
+    columns[2, 3] = math.inf
+    plain = columns.copy()
+    fill_shapes(columns)
+    interpreted(fill_shapes)(plain)
+    np.testing.assert_array_equal(columns, plain)
+
+
+@given(st.sets(st.integers(0, 60), min_size=1), st.data())
+def test_moments_are_found_at_once_only_where_they_follow_each_other(
+    moments: set[int], data: st.DataObject
+) -> None:
+    held = np.array(sorted(moments), dtype=np.int64)
+    wanted = np.array(data.draw(st.lists(st.integers(0, 60), unique=True)), dtype=np.int64)
+    runs = [slice(first, first + len(wanted)) for first in range(len(held))]
+    matching = [run for run in runs if len(wanted) and held[run].tolist() == wanted.tolist()]
+    assert run_of(held, wanted) == (matching[0] if matching else None)

@@ -22,7 +22,7 @@ from estimation.own_motion.odometry_history import InputTrust, MotionSample
 from estimation.own_motion.own_track import OwnNoise, OwnPoint
 from estimation.tracking.follower_check import Cause
 from estimation.tracking.track_point import TrackPoint, Verdict
-from estimation.tracking.tracker import TrackSettings
+from estimation.tracking.track_settings import TrackSettings
 from formation.kernel import compiles
 from formation.lending import lent
 from formation.pose import Pose, advance
