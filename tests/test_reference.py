@@ -31,7 +31,7 @@ from tests.reference_logs import (
     written_on,
 )
 
-LARGEST_BYTES = 150_000
+LARGEST_BYTES = 160_000  # the writer says every second again what channels there are
 
 
 def difference_report(name: str, lines: list[str]) -> str:

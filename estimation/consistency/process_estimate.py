@@ -5,8 +5,11 @@ rate, each in steps of a constant ratio from a leader that never changes to one 
 run beside the main filter on what this has believed, put together over a thirtieth of a second, since noise
 is a slow thing to learn. The score of each is the logarithm of its likelihood, forgotten over half a minute.
 
-Between members the score is that of white noise whose power is told wrongly by the ratio e^y (Whittle):
-K (y + exp(-y)), highest where y = 0. Three members around the best one tell where that is.
+Between members the score is that of a spectrum told wrongly (Whittle, 1953). White noise that is summed up
+n / 2 times on its way to a position, twice for the speed and three times for the turn rate, has there a
+density of q / w^n beside the even one of the sensor. By a q told as e^y times what it is the logarithm of the
+likelihood falls short by K ((n - 1) exp(y / n) + exp(y / n - y)), least at y = 0. Three members around the
+best one tell where that is.
 """
 
 from __future__ import annotations
@@ -39,9 +42,10 @@ from formation.records import Rows, load_across, store_across
 FORGOTTEN = 30.0
 """Time [s] in which scores are forgotten."""
 
-SHARE = 0.85
-"""Share of the likeliest noise that is taken. For leaders that move as the filter's model says it makes
-errors larger than reported by a tenth; for those that steer smoothly what is reported is too large by more.
+TURN_SHARE, SPEED_SHARE = 0.85, 0.65
+"""Shares of the likeliest noise that are taken. For leaders that move as the filter's model says they make
+errors larger than reported by a tenth; for those that steer smoothly and drive evenly what is reported is too
+large by more.
 """
 
 _TOLD_SD = math.log(10.0)  # what is told is known to a factor of ten
@@ -262,12 +266,16 @@ def _noise_by_members(bank: Rows[Member], found: ProcessNoise, rules: ProcessLea
 
 
 class Range(NamedTuple):
-    """Where the bandwidths of members lie: logarithms of the lowest to the told one, and of their ratio."""
+    """Where the bandwidths of members lie: logarithms of the lowest to the told one, and of their ratio.
+
+    order: power of the frequency by which this noise falls in positions.
+    """
 
     first: int
     members: int
     lowest: float
     step: float
+    order: float
 
 
 @kernel
@@ -275,16 +283,16 @@ def _range_of(rules: ProcessLearning, turn: bool) -> Range:
     """Range of the members that differ by the turn rate's noise, or by the speed's."""
     if turn:
         told = rules.told.q_u / rules.turn
-        return Range(0, TURN_MEMBERS, math.log(TURN_LOWEST / told), math.log(TURN_RATIO))
+        return Range(0, TURN_MEMBERS, math.log(TURN_LOWEST / told), math.log(TURN_RATIO), 6.0)
     told = rules.told.q_v / rules.speed
-    return Range(TURN_MEMBERS, SPEED_MEMBERS, math.log(SPEED_LOWEST / told), math.log(SPEED_RATIO))
+    return Range(TURN_MEMBERS, SPEED_MEMBERS, math.log(SPEED_LOWEST / told), math.log(SPEED_RATIO), 4.0)
 
 
 @kernel
 def _taken(bank: Rows[Member], rules: ProcessLearning, before: float, dt: float, turn: bool) -> float:
     """Ratio to the told bandwidth to go on with: the likeliest, but no faster down than leaders may calm."""
     falling = _TURN_FALLING if turn else _SPEED_FALLING
-    first, count, lowest, step = _range_of(rules, turn)
+    first, count, lowest, step, order = _range_of(rules, turn)
     best, highest = 0, _posterior(bank, first)
     for k in range(1, count):
         here = _posterior(bank, first + k)
@@ -295,7 +303,7 @@ def _taken(bank: Rows[Member], rules: ProcessLearning, before: float, dt: float,
     if inside:
         below = highest - _posterior(bank, first + best - 1)
         above = highest - _posterior(bank, first + best + 1)
-        peak += _vertex(below, above, step)
+        peak += vertex(below, above, step, order)
     total, mean = 0.0, 0.0
     for k in range(count):
         off = lowest + step * k
@@ -304,7 +312,8 @@ def _taken(bank: Rows[Member], rules: ProcessLearning, before: float, dt: float,
         near = inside and best - 1 <= k <= best + 1
         total += weight
         mean += weight * (peak if near else off)
-    return max(SHARE * math.exp(mean / total), before * math.exp(-falling * dt))
+    share = TURN_SHARE if turn else SPEED_SHARE
+    return max(share * math.exp(mean / total), before * math.exp(-falling * dt))
 
 
 @kernel
@@ -322,10 +331,13 @@ def _prior(off: float) -> float:
 
 
 @kernel
-def _vertex(below: float, above: float, step: float) -> float:
-    """Where K (y + exp(-y)) is highest, off the middle of three members, the others being lower by these."""
-    growth, decay = math.exp(step) - 1.0, 1.0 - math.exp(-step)
-    scale = above * growth + below * decay
+def vertex(below: float, above: float, step: float, order: float) -> float:
+    """Where the score is highest, off the middle of three members, the others being lower by these.
+
+    With w = exp(-y) of the middle one, what either falls short by is linear in w, and so is their ratio.
+    """
+    few, many = step / order, step * (order - 1.0) / order
+    scale = above * (math.exp(many) - 1.0) + below * (1.0 - math.exp(-many))
     if scale <= 0.0:
         return 0.0
-    return max(-0.5 * step, min(0.5 * step, math.log(step * (below + above) / scale)))
+    return math.log((order - 1.0) * (below * (math.exp(few) - 1.0) + above * (1.0 - math.exp(-few))) / scale)

@@ -25,9 +25,9 @@ LARGEST_SHARE = 3.0
 SPEED_LEAN, TURN_LEAN = 1.0, 0.5
 """Means [standard deviations] that runs along and across are looked for by."""
 
-SPEED_ALARM, TURN_ALARM = 9.0, 7.6
-"""Logarithms [nat] of how much likelier such a run must be than chance, which brings either in 8,000
-innovations: by a mean m a sum takes 2 (exp(h) - h - 1) / m^2 of them to reach h (Siegmund 1985)."""
+SPEED_ALARM, TURN_ALARM, BY_CHANCE = 9.0, 7.6, 8000.0
+"""Logarithms [nat] of how much likelier such a run must be than chance, and innovations in which that brings
+either: by a mean m a sum takes 2 (exp(h) - h - 1) / m^2 of them to reach h (Siegmund 1985)."""
 
 LASTS = 0.15
 """How long [s] the noise stays raised after an alarm: about as long as a robot's actuators take."""
@@ -41,11 +41,13 @@ REMEMBERED = 20.0
 SPEED_RAISED, TURN_RAISED = 0.3, 1.0
 """Bandwidths that the noise is raised to: a step of half of what a leader can do, every second or so."""
 
-SPEED_JUMPY, TURN_JUMPY = 0.1, 0.5
-"""Bandwidths of a leader that turns, stops and goes as it likes, and is found to: what its motion comes to on
-average has no such tails as its jumps have."""
+TURN_JUMPY = 0.5
+"""Bandwidth of a leader that turns as it likes, and is found to: what its turning comes to on average has no
+such tails as its jumps have."""
 
-_SET_OFF = 1.0  # [s]
+SET_OFF = 1.0
+"""Time [s] of a settled track in which no alarm counts as a jump."""
+
 # Share that one alarm adds to how sure it is that a leader makes jumps of its turn rate: these come every few
 # seconds, an alarm by chance once a minute, and one leader in five or so is of that kind.
 _SURE = 0.8
@@ -59,10 +61,12 @@ class Manoeuvre(NamedTuple):
 
     ahead, behind, left, right: likelihood ratios [nat] of a run to that side. running, turning: for how long
     [s] the one along and the one across have grown. speed_was, speed_variance: speed [m/s] before the one
-    along, and its variance. unjudged: how long [s] it is still to be compared with the speed after an alarm.
-    speed_raised, turn_raised: how long [s] noise is to stay raised. speed_jumps, turn_jumps: how sure it is,
-    up to 1, that the leader makes jumps. settled_for: for how long [s] the track has been settled: who sets
-    off makes no jump yet.
+    along, and its variance. unjudged: how long [s] it is still to be compared with the speed after an alarm;
+    jump: the largest square [m^2/s^2] that it was off by since. speed_raised, turn_raised: how long [s] noise
+    is to stay raised. jumps, speed_jumps: number of jumps of the speed and sum of their squares [m^2/s^2];
+    watched: time [s] of a settled track that they were found in; all of them are forgotten. turn_jumps: how
+    sure it is, up to 1, that the leader makes jumps of its turn rate. settled_for: for how long [s] the track
+    has been settled: who sets off makes no jump yet.
     """
 
     ahead: float
@@ -74,9 +78,12 @@ class Manoeuvre(NamedTuple):
     speed_was: float
     speed_variance: float
     unjudged: float
+    jump: float
     speed_raised: float
     turn_raised: float
+    jumps: float
     speed_jumps: float
+    watched: float
     turn_jumps: float
     settled_for: float
 
@@ -91,7 +98,7 @@ class Noticed(NamedTuple):
 @kernel
 def steady() -> Manoeuvre:
     """No sign of any manoeuvre."""
-    return Manoeuvre(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Manoeuvre(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -104,7 +111,9 @@ def later(manoeuvre: Manoeuvre, dt: float, settled: bool) -> Manoeuvre:
         unjudged=max(0.0, manoeuvre.unjudged - dt),
         speed_raised=max(0.0, manoeuvre.speed_raised - dt),
         turn_raised=max(0.0, manoeuvre.turn_raised - dt),
+        jumps=manoeuvre.jumps * kept,
         speed_jumps=manoeuvre.speed_jumps * kept,
+        watched=manoeuvre.watched * kept + (dt if settled else 0.0),
         turn_jumps=manoeuvre.turn_jumps * kept,
         settled_for=manoeuvre.settled_for + dt if settled else 0.0,
     )
@@ -113,13 +122,13 @@ def later(manoeuvre: Manoeuvre, dt: float, settled: bool) -> Manoeuvre:
 @kernel
 def raised(noise: ProcessNoise, manoeuvre: Manoeuvre, limits: LeaderLimits) -> ProcessNoise:
     """Process noise of a leader that makes jumps, or just now seems to."""
-    speed, turn = SPEED_JUMPY * manoeuvre.speed_jumps, TURN_JUMPY * manoeuvre.turn_jumps
+    highest, turn = SPEED_RAISED * limits.k_v * limits.k_v, TURN_JUMPY * manoeuvre.turn_jumps
+    speed = min(highest, manoeuvre.speed_jumps / max(manoeuvre.watched, SET_OFF))
     if manoeuvre.speed_raised > 0.0:
-        speed = SPEED_RAISED
+        speed = highest
     if manoeuvre.turn_raised > 0.0:
         turn = TURN_RAISED
-    q_v = max(noise.q_v, speed * limits.k_v * limits.k_v)
-    return noise._replace(q_v=q_v, q_u=max(noise.q_u, turn * limits.k_u * limits.k_u))
+    return noise._replace(q_v=max(noise.q_v, speed), q_u=max(noise.q_u, turn * limits.k_u * limits.k_u))
 
 
 @kernel
@@ -157,17 +166,20 @@ def noticed(
     )
     if running == 0.0 and manoeuvre.unjudged <= 0.0:
         after = after._replace(speed_was=speed, speed_variance=variance)
-    belief, settled = prior, manoeuvre.settled_for >= _SET_OFF
+    belief, settled = prior, manoeuvre.settled_for >= SET_OFF
     if max(ahead, behind) > SPEED_ALARM:
         if manoeuvre.speed_raised <= 0.0:
             lacking = max(0.0, SPEED_RAISED * limits.k_v * limits.k_v - noise.q_v)
-            belief = _with_speed_unsure(belief, ex, ey, lacking, min(running, LASTS))
+            belief = with_speed_unsure(belief, ex, ey, lacking, min(running, LASTS))
+        jump = manoeuvre.jump if manoeuvre.unjudged > 0.0 else 0.0
         unjudged = JUDGED if settled else manoeuvre.unjudged
-        after = after._replace(ahead=0.0, behind=0.0, running=0.0, speed_raised=LASTS, unjudged=unjudged)
+        after = after._replace(
+            ahead=0.0, behind=0.0, running=0.0, speed_raised=LASTS, unjudged=unjudged, jump=jump
+        )
     if max(left, right) > TURN_ALARM:
         if manoeuvre.turn_raised <= 0.0:
             lacking = max(0.0, TURN_RAISED * limits.k_u * limits.k_u - noise.q_u)
-            belief = _with_turning_unsure(belief, lacking, min(turning, LASTS))
+            belief = with_turning_unsure(belief, lacking, min(turning, LASTS))
         jumps = min(1.0, manoeuvre.turn_jumps + (_SURE if settled else 0.0))
         after = after._replace(left=0.0, right=0.0, turning=0.0, turn_raised=LASTS, turn_jumps=jumps)
     return Noticed(after, belief)
@@ -177,17 +189,24 @@ def noticed(
 def _judged(manoeuvre: Manoeuvre, speed: float, variance: float) -> Manoeuvre:
     """The same, an alarm of the speed counting as a jump once the speed surely is another one than before.
 
-    By chance innovations may lean to one side for a while, but the speed is the same one afterwards.
+    By chance innovations may lean to one side for a while, but the speed is the same one afterwards. The jump
+    is the largest that it is off by, less what errors come to.
     """
-    apart = speed - manoeuvre.speed_was
-    differs = apart * apart > _APART * _APART * (variance + manoeuvre.speed_variance)
-    if manoeuvre.unjudged <= 0.0 or not differs:
+    apart, errors = speed - manoeuvre.speed_was, variance + manoeuvre.speed_variance
+    jump = apart * apart - errors
+    differs = apart * apart > _APART * _APART * errors
+    if manoeuvre.unjudged <= 0.0 or not differs or jump <= manoeuvre.jump:
         return manoeuvre
-    return manoeuvre._replace(unjudged=0.0, speed_jumps=1.0)
+    another = 1.0 if manoeuvre.jump == 0.0 else 0.0
+    return manoeuvre._replace(
+        jump=jump,
+        jumps=manoeuvre.jumps + another,
+        speed_jumps=manoeuvre.speed_jumps + jump - manoeuvre.jump,
+    )
 
 
 @kernel
-def _with_speed_unsure(belief: Gaussian, ex: float, ey: float, q_v: float, dt: float) -> Gaussian:
+def with_speed_unsure(belief: Gaussian, ex: float, ey: float, q_v: float, dt: float) -> Gaussian:
     """Belief whose speed, in its direction (ex, ey), was driven by more noise for dt [s]."""
     lacking = q_v * dt
     return belief._replace(
@@ -198,7 +217,7 @@ def _with_speed_unsure(belief: Gaussian, ex: float, ey: float, q_v: float, dt: f
 
 
 @kernel
-def _with_turning_unsure(belief: Gaussian, q_u: float, dt: float) -> Gaussian:
+def with_turning_unsure(belief: Gaussian, q_u: float, dt: float) -> Gaussian:
     """Belief whose turn rate was driven by more noise for dt [s], and its direction by the turn rate."""
     vx, vy = belief.vx, belief.vy
     turn, both, direction = q_u * dt, q_u * dt * dt / 2.0, q_u * dt * dt * dt / 3.0

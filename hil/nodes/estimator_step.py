@@ -38,6 +38,7 @@ from estimation.own_motion.odometry_history import (
 )
 from estimation.own_motion.odometry_noise import noise_with_sample
 from estimation.own_motion.own_track import folded, motion_of, own_place, own_point, own_predicted
+from estimation.tracking.begun_jump import borne
 from estimation.tracking.estimate import estimate_at, guessed_when_slow
 from estimation.tracking.follower_check import BELIEVED, MOUNT
 from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
@@ -362,5 +363,8 @@ def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) 
     waits = status in (TRACKING, INITIALISING)
     if waits and rules.mounts.stops and known.mount_check.off:
         status, cause = REJECTING, MOUNT
-    point = point._replace(belief=rules.filter.told_speed(point.belief))
+    belief = point.belief
+    if rules.settings.notices_manoeuvres:
+        belief = borne(belief, point.manoeuvre, point.noise, rules.filter.limits, point.period)
+    point = point._replace(belief=rules.filter.told_speed(belief))
     return Told(guessed_when_slow(estimate_at(point, status), rules.filter.limits.v_eps), cause)

@@ -18,7 +18,7 @@ from estimation.tracking.manoeuvre import (
     LASTS,
     REMEMBERED,
     SPEED_ALARM,
-    SPEED_JUMPY,
+    SPEED_RAISED,
     TURN_ALARM,
     TURN_JUMPY,
     TURN_LEAN,
@@ -117,17 +117,44 @@ def test_an_alarm_counts_as_a_jump_if_the_speed_is_another_one_afterwards(step: 
     assert manoeuvre.speed_raised == LASTS
     there = prior(0.3, 0.08 + step)
     soon, _ = noticed(later(manoeuvre, 0.9 * JUDGED, True), there, seen(0.3, 0.0, 0.0), NOISE, LIMITS)
-    assert (soon.speed_jumps == 1.0) == (abs(step) > 3.0 * math.sqrt(2.0) * 1e-4)
+    counts = abs(step) > 3.0 * math.sqrt(2.0) * 1e-4
+    assert soon.jumps == (1.0 if counts else 0.0)
+    assert soon.speed_jumps == pytest.approx(step**2 - 2e-8 if counts else 0.0)
     late, _ = noticed(later(manoeuvre, 1.1 * JUDGED, True), there, seen(0.3, 0.0, 0.0), NOISE, LIMITS)
-    assert (late.unjudged, late.speed_jumps) == (0.0, 0.0)
+    assert (late.unjudged, late.jumps, late.speed_jumps) == (0.0, 0.0, 0.0)
+
+
+def test_a_jump_counts_once_and_by_the_most_that_the_speed_is_off_by() -> None:
+    manoeuvre = after([(0.0, 0.0), *[(2.0, 0.0)] * 7])[0]
+    for step in (0.005, 0.01, 0.03, 0.02):
+        there = prior(0.3, 0.08 + step)
+        manoeuvre, _ = noticed(later(manoeuvre, FRAME, True), there, seen(0.3, 0.0, 0.0), NOISE, LIMITS)
+    assert manoeuvre.jumps == pytest.approx(1.0, abs=0.01)
+    assert manoeuvre.speed_jumps == pytest.approx(0.03**2, rel=0.01)
+
+
+@given(st.floats(0.01, 0.05), st.floats(0.5, 4.0))
+def test_a_leader_known_to_jump_is_driven_by_the_squares_of_its_jumps_per_time(
+    size: float, every: float
+) -> None:
+    manoeuvre = steady()
+    for k in range(round(90.0 / FRAME)):
+        manoeuvre = later(manoeuvre, FRAME, True)
+        if k % round(every / FRAME) == 0:
+            grown = manoeuvre.speed_jumps + size * size
+            manoeuvre = manoeuvre._replace(speed_jumps=grown)
+    highest = SPEED_RAISED * LIMITS.k_v**2
+    # Just before or after a jump it is a little less or more.
+    expected = pytest.approx(min(highest, size**2 / every), rel=1.2 * every / REMEMBERED)
+    assert raised(NOISE, manoeuvre, LIMITS).q_v == expected
 
 
 def test_what_is_raised_falls_back_and_that_a_leader_jumps_is_forgotten_slowly() -> None:
-    manoeuvre = after([(2.0, 2.0)] * 9)[0]._replace(speed_jumps=0.8)
+    manoeuvre = after([(2.0, 2.0)] * 9)[0]._replace(speed_jumps=4e-4)
     soon, late = later(manoeuvre, 1.5 * LASTS, True), later(manoeuvre, REMEMBERED, True)
     assert (soon.speed_raised, soon.turn_raised) == (0.0, 0.0)
-    jumpy = ProcessNoise.by_rule(LIMITS, 0.8 * TURN_JUMPY, 0.8 * SPEED_JUMPY)
-    assert raised(NOISE, soon, LIMITS).q_v == pytest.approx(jumpy.q_v, rel=0.02)
+    jumpy = ProcessNoise.by_rule(LIMITS, 0.8 * TURN_JUMPY)
+    assert raised(NOISE, soon, LIMITS).q_v == pytest.approx(4e-4, rel=0.02)
     assert raised(NOISE, soon, LIMITS).q_u == pytest.approx(jumpy.q_u, rel=0.02)
     assert raised(NOISE, late, LIMITS) == NOISE
     assert raised(NOISE, steady(), LIMITS) == NOISE
