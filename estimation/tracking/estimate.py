@@ -164,6 +164,14 @@ def guessed_when_slow(estimate: Estimate, v_eps: float) -> Estimate:
 
 
 @kernel
+def guessed_if_standing(estimate: Estimate, standing: float) -> Estimate:
+    """Estimate of a leader that stands by a probability: where it would drive to is then any guess."""
+    joint = estimate.joint
+    mixed = joint.b_b + standing * max(0.0, GUESSED - joint.b_b)
+    return estimate._replace(joint=joint._replace(b_b=mixed))
+
+
+@kernel
 def along_own_axes(belief: Gaussian, measurement: Measurement, jump: JumpUncertainty) -> Gaussian:
     """Belief along the follower's axes; a mocap pose brings its own noise into it, a jump what it may be.
 

@@ -38,7 +38,7 @@ from estimation.own_motion.odometry_history import (
 )
 from estimation.own_motion.odometry_noise import noise_with_sample
 from estimation.own_motion.own_track import folded, motion_of, own_place, own_point, own_predicted
-from estimation.tracking.estimate import estimate_at, guessed_when_slow
+from estimation.tracking.estimate import estimate_at, guessed_if_standing, guessed_when_slow
 from estimation.tracking.follower_check import BELIEVED, MOUNT
 from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
 from estimation.tracking.follower_check import GATED as LEADER_OFF
@@ -362,5 +362,7 @@ def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) 
     waits = status in (TRACKING, INITIALISING)
     if waits and rules.mounts.stops and is_off(known.mount_check):
         status, cause = REJECTING, MOUNT
-    point = point._replace(belief=rules.filter.told_speed(point.belief))
-    return Told(guessed_when_slow(estimate_at(point, status), rules.filter.limits.v_eps), cause)
+    told = rules.filter.told_speed(point.belief)
+    found = estimate_at(point._replace(belief=told.belief), status)
+    found = guessed_if_standing(found, told.standing)
+    return Told(guessed_when_slow(found, rules.filter.limits.v_eps), cause)
