@@ -235,8 +235,14 @@ def test_alpha1_of_a_leader_that_may_stand_is_that_far_a_guess_and_nothing_else_
     moment = mocap_moment(leader, follower, own, (0.002, 0.01))
     told = estimated(world_belief(leader, Motion(0.1, 0.2)), moment)
     doubted = guessed_if_standing(told, standing)
-    # The variance of a mixture of two with the same mean.
-    mixed = (1.0 - standing) * told.joint.b_b + standing * GUESSED
-    assert doubted.joint.b_b == pytest.approx(max(told.joint.b_b, mixed), rel=1e-12)
-    assert doubted.joint._replace(b_b=told.joint.b_b) == told.joint
+    # The variance of a mixture of two with the same mean, of which v1 is the mean of zero and another.
+    own = (1.0 - standing) ** 2 * told.joint.b_b
+    mixed = (1.0 - standing) * own + standing * GUESSED
+    assert doubted.joint.b_b == pytest.approx(max(own, mixed), rel=1e-12)
+    others = [0, 1, 2, 4]
+    kept, was = doubted.covariance[np.ix_(others, others)], told.covariance[np.ix_(others, others)]
+    np.testing.assert_array_equal(kept, was)
+    np.testing.assert_allclose(doubted.covariance[3, others], (1.0 - standing) * told.covariance[3, others])
+    least = np.linalg.eigvalsh(doubted.covariance).min()
+    assert least >= min(0.0, np.linalg.eigvalsh(told.covariance).min()) - 1e-9
     assert doubted._replace(joint=told.joint) == told
