@@ -236,9 +236,9 @@ def test_alpha1_of_a_leader_that_may_stand_is_that_far_a_guess_and_nothing_else_
     told = estimated(world_belief(leader, Motion(0.1, 0.2)), moment)
     doubted = guessed_if_standing(told, standing)
     # The variance of a mixture of two with the same mean, of which v1 is the mean of zero and another.
-    own = (1.0 - standing) ** 2 * told.joint.b_b
-    mixed = (1.0 - standing) * own + standing * GUESSED
-    assert doubted.joint.b_b == pytest.approx(max(own, mixed), rel=1e-12)
+    driving = (1.0 - standing) ** 2 * told.joint.b_b
+    mixed = (1.0 - standing) * driving + standing * GUESSED
+    assert doubted.joint.b_b == pytest.approx(max(driving, mixed), rel=1e-12)
     others = [0, 1, 2, 4]
     kept, was = doubted.covariance[np.ix_(others, others)], told.covariance[np.ix_(others, others)]
     np.testing.assert_array_equal(kept, was)
