@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol
 from estimation.filters.belief import Belief, Model, innovation
 from estimation.filters.filter import Kind, Stepped, filter_of
 from estimation.filters.gaussian import Gaussian
+from estimation.filters.leader_prior import SpeedTold
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise
 from estimation.models.measurement import FrontEnd, Measurement
 
@@ -141,9 +142,9 @@ class Interpreted:
         """See :meth:`~estimation.filters.filter.Filter.leader`; no lever arm is known of here."""
         return belief
 
-    def told_speed(self, belief: Gaussian) -> Gaussian:
+    def told_speed(self, belief: Gaussian) -> SpeedTold:
         """Itself; see :meth:`~estimation.filters.filter.Filter.told_speed`."""
-        return belief
+        return SpeedTold(belief, 0.0)
 
     def step(
         self, belief: Gaussian, dt: float, follower: FollowerMotion, measurement: Measurement, gate: float

@@ -14,7 +14,7 @@ from estimation.filters.belief import Model
 from estimation.filters.difference import differenced, first_difference
 from estimation.filters.ekf import extended_moved, informed, mean_of, seen_by_follower
 from estimation.filters.gaussian import Gaussian, nis_of, started, widened
-from estimation.filters.leader_prior import standing_noise, usual_speed, within_limits
+from estimation.filters.leader_prior import SpeedTold, standing_noise, usual_speed, within_limits
 from estimation.filters.lever_arm import NO_LEVER, Lever, is_centred, robot_under, swung
 from estimation.filters.ukf import unscented_moved
 from estimation.models.coordinated_turn import FollowerMotion, LeaderLimits, ProcessNoise, moved
@@ -126,10 +126,10 @@ class Filter(NamedTuple):
         return robot_under(belief, self.lever, self.limits.v_eps)
 
     @kernel
-    def told_speed(self, belief: Gaussian) -> Gaussian:
-        """Belief as it is told: along the follower's axes with how fast leaders are, if they drive at all."""
+    def told_speed(self, belief: Gaussian) -> SpeedTold:
+        """Belief as it is told: along the follower's axes with how fast leaders are, which stand or drive."""
         if self.in_world or self.kind == DIFFERENCE:
-            return belief
+            return SpeedTold(belief, 0.0)
         return usual_speed(belief, self.limits)
 
     @kernel

@@ -19,6 +19,7 @@ from estimation.models.coordinated_turn import LeaderLimits, ProcessNoise
 from formation.kernel import kernel
 
 _LEAST_SPEED = 1e-9  # [m/s]; below it there is no direction
+_SURE = 50.0  # of a log-likelihood: beyond it nothing is left of the other
 
 
 class _Column(NamedTuple):
@@ -29,6 +30,13 @@ class _Column(NamedTuple):
     vx: float
     vy: float
     u: float
+
+
+class SpeedTold(NamedTuple):
+    """Belief to which the speeds of leaders are told, and how likely the leader is to stand by that."""
+
+    belief: Gaussian
+    standing: float
 
 
 @kernel
@@ -48,7 +56,8 @@ def within_limits(b: Gaussian, dt: float, noise: ProcessNoise, limits: LeaderLim
     if dt <= 0.0:
         return b
     turn = limits.k_u * limits.k_u * (1.0 / 3.0)
-    b = _told(b, _Column(b.x_u, b.y_u, b.vx_u, b.vy_u, b.u_u), b.u_u, -b.u, turn * turn / (noise.q_u * dt))
+    by = 1.0 / (b.u_u + turn * turn / (noise.q_u * dt))
+    b = _told(b, _Column(b.x_u, b.y_u, b.vx_u, b.vy_u, b.u_u), -by * b.u, by)
     speed, least = math.sqrt(b.vx * b.vx + b.vy * b.vy), limits.v_eps
     middle = 0.5 * (limits.k_v + least)
     if speed <= middle or limits.k_v <= least:
@@ -63,23 +72,38 @@ def within_limits(b: Gaussian, dt: float, noise: ProcessNoise, limits: LeaderLim
     span = limits.k_v - least
     known = span * span * (1.0 / 12.0)
     variance = known * known / (weight * weight * noise.q_v * dt)
-    return _told(b, along, c * along.vx + s * along.vy, middle - speed, variance)
+    by = 1.0 / (c * along.vx + s * along.vy + variance)
+    return _told(b, along, by * (middle - speed), by)
 
 
 @kernel(inline=False)
-def usual_speed(b: Gaussian, limits: LeaderLimits) -> Gaussian:
-    """Belief with the speeds that a leader may have: any from v_eps to k_v is as likely as another.
+def usual_speed(b: Gaussian, limits: LeaderLimits) -> SpeedTold:
+    """Belief with the speeds that a leader may have: it stands, or drives at any from v_eps to k_v.
 
-    Along the direction in which it seems to drive it is told their middle, with their variance. To be told
-    over and over that would hold a direction that is wrong, so that this is for what goes out, and nothing is
-    carried on from it. Where the speed is measured well it makes no difference.
+    How often it stands nobody tells: as often as makes half of k_v the mean, as if any speed from zero on
+    were as likely as another. Along the direction in which it seems to drive the belief is that of one which
+    stands and that of one which is told the middle of the speeds, with their variance; by how well each
+    explains what was seen it becomes the mean and the variance of both. To be told over and over that would
+    hold a direction that is wrong, so that this is for what goes out, and nothing is carried on from it.
+    Where the speed is measured well it makes no difference.
     """
     speed, span = math.sqrt(b.vx * b.vx + b.vy * b.vy), limits.k_v - limits.v_eps
     if speed <= _LEAST_SPEED or span <= 0.0:
-        return b
+        return SpeedTold(b, 0.0)
     along = _along(b, b.vx / speed, b.vy / speed)
     own = (b.vx * along.vx + b.vy * along.vy) / speed
-    return _told(b, along, own, 0.5 * (limits.k_v + limits.v_eps) - speed, span * span * (1.0 / 12.0))
+    if own <= 0.0:
+        return SpeedTold(b, 0.0)
+    known, off = span * span * (1.0 / 12.0), 0.5 * (limits.k_v + limits.v_eps) - speed
+    by = 1.0 / (own + known)
+    likelier = 0.5 * (speed * speed / own - off * off * by + math.log(own * by))
+    standing = 0.0
+    if likelier < _SURE:
+        standing = limits.v_eps / (limits.v_eps + limits.k_v * math.exp(likelier))
+    driven = speed + own * by * off
+    mean = (1.0 - standing) * driven
+    variance = (1.0 - standing) * (own * known * by + standing * driven * driven)
+    return SpeedTold(_told(b, along, (mean - speed) / own, (own - variance) / (own * own)), standing)
 
 
 @kernel
@@ -95,29 +119,31 @@ def _along(b: Gaussian, c: float, s: float) -> _Column:
 
 
 @kernel
-def _told(b: Gaussian, p: _Column, own: float, residual: float, variance: float) -> Gaussian:
-    """Belief after one number, of the column ``p`` and variance ``own``, was told with a variance."""
-    by = 1.0 / (own + variance)
-    kx, ky, kvx, kvy, ku = by * p.x, by * p.y, by * p.vx, by * p.vy, by * p.u
+def _told(b: Gaussian, p: _Column, shift: float, less: float) -> Gaussian:
+    """Belief whose quantity of the column ``p`` has moved by shift times its variance.
+
+    ``less`` times the square of its variance is what that loses.
+    """
+    x, y, vx, vy, u = less * p.x, less * p.y, less * p.vx, less * p.vy, less * p.u
     return b._replace(
-        x=b.x + kx * residual,
-        y=b.y + ky * residual,
-        vx=b.vx + kvx * residual,
-        vy=b.vy + kvy * residual,
-        u=b.u + ku * residual,
-        x_x=b.x_x - kx * p.x,
-        x_y=b.x_y - kx * p.y,
-        x_vx=b.x_vx - kx * p.vx,
-        x_vy=b.x_vy - kx * p.vy,
-        x_u=b.x_u - kx * p.u,
-        y_y=b.y_y - ky * p.y,
-        y_vx=b.y_vx - ky * p.vx,
-        y_vy=b.y_vy - ky * p.vy,
-        y_u=b.y_u - ky * p.u,
-        vx_vx=b.vx_vx - kvx * p.vx,
-        vx_vy=b.vx_vy - kvx * p.vy,
-        vx_u=b.vx_u - kvx * p.u,
-        vy_vy=b.vy_vy - kvy * p.vy,
-        vy_u=b.vy_u - kvy * p.u,
-        u_u=b.u_u - ku * p.u,
+        x=b.x + p.x * shift,
+        y=b.y + p.y * shift,
+        vx=b.vx + p.vx * shift,
+        vy=b.vy + p.vy * shift,
+        u=b.u + p.u * shift,
+        x_x=b.x_x - x * p.x,
+        x_y=b.x_y - x * p.y,
+        x_vx=b.x_vx - x * p.vx,
+        x_vy=b.x_vy - x * p.vy,
+        x_u=b.x_u - x * p.u,
+        y_y=b.y_y - y * p.y,
+        y_vx=b.y_vx - y * p.vx,
+        y_vy=b.y_vy - y * p.vy,
+        y_u=b.y_u - y * p.u,
+        vx_vx=b.vx_vx - vx * p.vx,
+        vx_vy=b.vx_vy - vx * p.vy,
+        vx_u=b.vx_u - vx * p.u,
+        vy_vy=b.vy_vy - vy * p.vy,
+        vy_u=b.vy_u - vy * p.u,
+        u_u=b.u_u - u * p.u,
     )

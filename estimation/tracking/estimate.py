@@ -164,6 +164,25 @@ def guessed_when_slow(estimate: Estimate, v_eps: float) -> Estimate:
 
 
 @kernel
+def guessed_if_standing(estimate: Estimate, standing: float) -> Estimate:
+    """Estimate of a leader that stands by a probability: where it would drive to is then any guess.
+
+    Its v1 is the mean of zero and of how fast it drives if it does, of which alpha1 has the deviation.
+    """
+    joint, drives = estimate.joint, 1.0 - standing
+    own = drives * drives * joint.b_b
+    return estimate._replace(
+        joint=joint._replace(
+            r_b=drives * joint.r_b,
+            a_b=drives * joint.a_b,
+            v_b=drives * joint.v_b,
+            b_b=own + standing * max(0.0, GUESSED - own),
+            b_u=drives * joint.b_u,
+        )
+    )
+
+
+@kernel
 def along_own_axes(belief: Gaussian, measurement: Measurement, jump: JumpUncertainty) -> Gaussian:
     """Belief along the follower's axes; a mocap pose brings its own noise into it, a jump what it may be.
 

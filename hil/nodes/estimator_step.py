@@ -39,7 +39,7 @@ from estimation.own_motion.odometry_history import (
 from estimation.own_motion.odometry_noise import noise_with_sample
 from estimation.own_motion.own_track import folded, motion_of, own_place, own_point, own_predicted
 from estimation.tracking.begun_jump import borne
-from estimation.tracking.estimate import estimate_at, guessed_when_slow
+from estimation.tracking.estimate import estimate_at, guessed_if_standing, guessed_when_slow
 from estimation.tracking.follower_check import BELIEVED, MOUNT
 from estimation.tracking.follower_check import FOLLOWER as FOLLOWER_OFF
 from estimation.tracking.follower_check import GATED as LEADER_OFF
@@ -366,5 +366,7 @@ def estimate(known: Known, points: Rows[TrackPoint], rules: Rules, now_ns: int) 
     belief = point.belief
     if rules.settings.notices_manoeuvres:
         belief = borne(belief, point.manoeuvre, point.noise, rules.filter.limits, point.period)
-    point = point._replace(belief=rules.filter.told_speed(belief))
-    return Told(guessed_when_slow(estimate_at(point, status), rules.filter.limits.v_eps), cause)
+    told = rules.filter.told_speed(belief)
+    found = estimate_at(point._replace(belief=told.belief), status)
+    found = guessed_if_standing(found, told.standing)
+    return Told(guessed_when_slow(found, rules.filter.limits.v_eps), cause)

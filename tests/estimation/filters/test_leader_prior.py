@@ -72,27 +72,45 @@ def test_no_time_changes_nothing() -> None:
     assert within_limits(b, 0.0, NOISE, LIMITS) == b
 
 
-@pytest.mark.parametrize("speed", [0.02, 0.15, 0.4])
+@pytest.mark.parametrize("speed", [0.02, 0.08, 0.15, 0.4])
 @pytest.mark.parametrize("sd", [0.002, 0.03, 0.2])
 def test_a_speed_is_told_with_those_that_leaders_have(speed: float, sd: float) -> None:
-    """Two Gaussians, one of the belief and one of the limits, by hand."""
+    """Bayes' rule by sums over a grid: speed zero, or a normal distribution of the limits' moments."""
     seen = belief(0.6 * speed, 0.8 * speed, 0.1, sd, 0.05)
-    variance = (LIMITS.k_v - LIMITS.v_eps) ** 2 / 12.0
-    gain = sd**2 / (sd**2 + variance)
-    told = usual_speed(seen, LIMITS)
-    assert told.speed == pytest.approx(speed + gain * (0.5 * (LIMITS.k_v + LIMITS.v_eps) - speed), rel=1e-9)
-    assert math.atan2(told.vy, told.vx) == pytest.approx(math.atan2(0.8, 0.6), rel=1e-9)
+    middle, known = 0.5 * (LIMITS.k_v + LIMITS.v_eps), (LIMITS.k_v - LIMITS.v_eps) / math.sqrt(12.0)
+    speeds = np.linspace(-2.0, 2.0, 400_001)
+    stands, drives = LIMITS.v_eps, LIMITS.k_v
+    # As often as makes the mean that of all speeds from zero on.
+    assert drives / (stands + drives) * middle == pytest.approx(0.5 * LIMITS.k_v)
+    prior = drives * np.exp(-0.5 * ((speeds - middle) / known) ** 2)
+    prior *= (speeds[1] - speeds[0]) / (known * math.sqrt(2.0 * math.pi))
+    prior[len(speeds) // 2] += stands
+    weights = prior * np.exp(-0.5 * ((speeds - speed) / sd) ** 2)
+    share = 1.0 - np.sum(np.delete(weights, len(speeds) // 2)) / np.sum(weights)
+    mean = np.sum(weights * speeds) / np.sum(weights)
+    told, standing = usual_speed(seen, LIMITS)
+    assert standing == pytest.approx(share, rel=1e-2, abs=1e-12)
+    assert told.speed == pytest.approx(mean, rel=1e-4)
     along = 0.36 * told.vx_vx + 0.96 * told.vx_vy + 0.64 * told.vy_vy
-    assert along == pytest.approx(sd**2 * (1.0 - gain), rel=1e-9)
+    assert along == pytest.approx(np.sum(weights * (speeds - mean) ** 2) / np.sum(weights), rel=1e-3)
+    assert math.atan2(told.vy, told.vx) == pytest.approx(math.atan2(0.8, 0.6), rel=1e-9)
     across = 0.64 * told.vx_vx - 0.96 * told.vx_vy + 0.36 * told.vy_vy
     assert across == pytest.approx(sd**2, rel=1e-9)
+    assert np.all(np.linalg.eigvalsh(told.covariance) > -1e-12)
+
+
+def test_who_is_seen_to_drive_does_not_stand() -> None:
+    driving = belief(0.15, 0.0, 0.1, 0.005, 0.05)
+    told, standing = usual_speed(driving, LIMITS)
+    assert standing == 0.0
+    assert told.speed == pytest.approx(0.15, rel=0.02)
 
 
 def test_who_seems_to_stand_still_has_no_direction_to_be_told_a_speed_along() -> None:
     still = belief(0.0, 0.0, 0.1, 0.01, 0.05)
-    assert usual_speed(still, LIMITS) == still
+    assert usual_speed(still, LIMITS) == (still, 0.0)
 
 
 def test_a_leader_of_one_speed_alone_is_left_alone() -> None:
     seen = belief(0.1, 0.0, 0.1, 0.01, 0.05)
-    assert usual_speed(seen, LeaderLimits(0.2, 0.2, 0.6)) == seen
+    assert usual_speed(seen, LeaderLimits(0.2, 0.2, 0.6)) == (seen, 0.0)

@@ -25,6 +25,7 @@ from estimation.tracking.estimate import (
     Estimate,
     estimate_at,
     estimate_of,
+    guessed_if_standing,
     guessed_when_slow,
 )
 from estimation.tracking.track_point import NO_JUMP, JumpUncertainty, begun
@@ -223,3 +224,25 @@ def test_below_v_eps_alpha1_is_a_guess_and_nothing_else_changes(
     assert pytest.approx(np.var(np.linspace(-math.pi, math.pi, 100_001)), rel=1e-4) == GUESSED
     least = np.linalg.eigvalsh(humble.covariance).min()
     assert least >= min(0.0, np.linalg.eigvalsh(told.covariance).min()) - 1e-12
+
+
+@given(poses, poses, follower_motions, st.floats(0.0, 1.0))
+@settings(deadline=None)
+def test_alpha1_of_a_leader_that_may_stand_is_that_far_a_guess_and_nothing_else_changes(
+    leader: Pose, follower: Pose, own: Motion, standing: float
+) -> None:
+    assume(math.dist((leader.x, leader.y), (follower.x, follower.y)) > 0.05)
+    moment = mocap_moment(leader, follower, own, (0.002, 0.01))
+    told = estimated(world_belief(leader, Motion(0.1, 0.2)), moment)
+    doubted = guessed_if_standing(told, standing)
+    # The variance of a mixture of two with the same mean, of which v1 is the mean of zero and another.
+    driving = (1.0 - standing) ** 2 * told.joint.b_b
+    mixed = (1.0 - standing) * driving + standing * GUESSED
+    assert doubted.joint.b_b == pytest.approx(max(driving, mixed), rel=1e-12)
+    others = [0, 1, 2, 4]
+    kept, was = doubted.covariance[np.ix_(others, others)], told.covariance[np.ix_(others, others)]
+    np.testing.assert_array_equal(kept, was)
+    np.testing.assert_allclose(doubted.covariance[3, others], (1.0 - standing) * told.covariance[3, others])
+    least = np.linalg.eigvalsh(doubted.covariance).min()
+    assert least >= min(0.0, np.linalg.eigvalsh(told.covariance).min()) - 1e-9
+    assert doubted._replace(joint=told.joint) == told
