@@ -158,13 +158,10 @@ def seen(lab: Lab, number: int, duration: float = 30.0) -> Outcome:
     poses = np.column_stack([follower.x, follower.y, follower.heading])
     poses += random.standard_normal((n, 3)) * [true_sigma, true_sigma, true_heading]
     places[random.random(n) < lab.lost] = math.nan
-    odometry: dict[str, FloatArray] = {}
+    v2 = u2 = None
     if lab.wheels > 0.0:
-        floor = lab.wheels * np.array([lab.k_v, lab.k_u])
-        odometry = {
-            "v2": follower.v + floor[0] * random.standard_normal(n),
-            "u2": follower.u + floor[1] * random.standard_normal(n),
-        }
+        v2 = follower.v + lab.wheels * lab.k_v * random.standard_normal(n)
+        u2 = follower.u + lab.wheels * lab.k_u * random.standard_normal(n)
     told = {
         "leader.v_eps": 0.4 * lab.k_v,
         "leader.k_v": lab.k_v,
@@ -179,7 +176,7 @@ def seen(lab: Lab, number: int, duration: float = 30.0) -> Outcome:
         "estimator.sigma_u2": max(lab.wheels, 0.01) * lab.k_u,
     }
     scenario = abreast.load_scenario("turtlebot3", told)
-    found = abreast.estimate(t, places, poses, scenario=scenario, **odometry)
+    found = abreast.estimate(t, places, poses, scenario=scenario, v2=v2, u2=u2)
     return judged(found, leader, follower)
 
 
