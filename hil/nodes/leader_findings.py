@@ -23,8 +23,8 @@ def limits_findings(point: TrackPoint, limits: LeaderLimits) -> Findings:
         return {}
     belief = point.belief
     speed, turn = speed_of(belief), abs(belief.u)
-    seen = []
-    if speed - _SURE * _sd_speed(belief) > _BEYOND * limits.k_v:
+    fastest, seen = _BEYOND * limits.k_v, []
+    if speed > fastest and speed - _SURE * _sd_speed(belief) > fastest:
         seen.append(f"it drives at {speed:.2g} m/s, expected up to leader.k_v = {limits.k_v:g}")
     if turn - _SURE * math.sqrt(belief.u_u) > _BEYOND * limits.k_u:
         seen.append(f"it turns at {turn:.2g} rad/s, expected up to leader.k_u = {limits.k_u:g}")

@@ -13,7 +13,7 @@ LAB = drawn(np.random.default_rng(3))._replace(
 @pytest.mark.parametrize("beside", [False, True])
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_estimates_in_an_ordinary_lab_are_as_wrong_as_they_say(program: str, beside: bool) -> None:
-    """Of whatever leader: tracked, none far beyond its deviation, errors at most half larger than reported."""
+    """Of whatever leader: tracked, none far beyond its deviation, errors at most half larger than told."""
     found = seen(LAB._replace(program=program, beside=beside), 1, duration=12.0)
     assert found.tracked > 0.85
     assert found.nees.shape == (len(QUANTITIES),)
