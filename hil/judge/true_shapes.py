@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 
 from formation.kernel import kernel
+from formation.pose import Motion
 from formation.records import Matrix
+from formation.shape import Shape, shape_rates
 from formation.wrapping import wrapped
 
 LEADER_X, LEADER_Y, LEADER_THETA, FOLLOWER_X, FOLLOWER_Y, FOLLOWER_THETA, V1, U1, V2, U2 = range(10)
@@ -25,11 +27,10 @@ def shapes_filled(columns: Matrix) -> None:
         if v1 < 0.0:
             leader, v1 = leader + math.pi, -1.0 * v1
         leader, follower = wrapped(leader), wrapped(columns[FOLLOWER_THETA, k])
-        rho, line, v2 = columns[RHO, k], columns[ALPHA1, k], columns[V2, k]
+        rho, line = columns[RHO, k], columns[ALPHA1, k]
         apart = 0.0 * rho
-        alpha1, alpha2 = wrapped(line - leader) + apart, wrapped(line + math.pi - follower) + apart
-        turning = (v1 * math.sin(alpha1) + v2 * math.sin(alpha2)) / rho
+        shape = Shape(rho, wrapped(line - leader) + apart, wrapped(line + math.pi - follower) + apart)
+        rates = shape_rates(shape, Motion(v1, columns[U1, k]), Motion(columns[V2, k], columns[U2, k]))
         columns[LEADER_THETA, k], columns[FOLLOWER_THETA, k], columns[V1, k] = leader, follower, v1
-        columns[ALPHA1, k], columns[ALPHA2, k] = alpha1, alpha2
-        columns[RHO_DOT, k] = -v1 * math.cos(alpha1) - v2 * math.cos(alpha2)
-        columns[ALPHA2_DOT, k] = turning - columns[U2, k]
+        columns[ALPHA1, k], columns[ALPHA2, k] = shape.alpha1, shape.alpha2
+        columns[RHO_DOT, k], columns[ALPHA2_DOT, k] = rates.rho_dot, rates.alpha2_dot
