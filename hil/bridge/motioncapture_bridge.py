@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import queue
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -13,6 +12,7 @@ from hil.bridge.mocap_wire import MocapWire
 from hil.bridge.seen_frame import SeenBody, SeenFrame
 from hil.errors import AbreastError, UsageError
 from hil.nodes.node import Outgoing
+from hil.wire.mailbox import Mailbox
 
 _WAITING_FRAMES = 1000
 
@@ -53,7 +53,7 @@ class MotionCaptureBridge:
 
     def __init__(self, connect: Callable[[], Source], where: str, wire: MocapWire) -> None:
         self._connect, self._where, self._wire = connect, where, wire
-        self._frames: queue.SimpleQueue[SeenFrame | None] = queue.SimpleQueue()
+        self._frames: Mailbox[SeenFrame | None] = Mailbox()
         self._next: SeenFrame | None = None
         self._connected, self._failure = False, ""
         self._number = self._dropped = 0
@@ -61,10 +61,7 @@ class MotionCaptureBridge:
 
     def wait(self, timeout: float) -> None:
         """Return when a frame has come, at the latest after ``timeout`` [s]."""
-        try:
-            self._next = self._frames.get(timeout=timeout)
-        except queue.Empty:
-            self._next = None
+        self._next = self._frames.take(timeout)
 
     def take(self, now_ns: int) -> Iterator[Outgoing]:
         """Messages of the frames that have come, and diagnostics when they are due.
@@ -107,7 +104,7 @@ class MotionCaptureBridge:
         now_ns = time.time_ns()
         self._number += 1
         bodies = tuple(_seen(name, body) for name, body in source.rigidBodies.items())
-        if self._frames.qsize() < _WAITING_FRAMES:
+        if len(self._frames) < _WAITING_FRAMES:
             self._frames.put(SeenFrame(self._number, now_ns, now_ns, bodies))
         else:
             self._dropped += 1

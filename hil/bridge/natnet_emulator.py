@@ -20,6 +20,7 @@ from hil.live.node_worker import NodeWorker
 from hil.nodes.node import Outgoing
 from hil.wire import topics
 from hil.wire.events import TICK, Event
+from hil.wire.mailbox import Bell
 from hil.wire.message_types import RigidBodies
 from hil.wire.messages import decode_as, to_ns
 from hil.wire.pose_sources import laid, places_of
@@ -148,13 +149,13 @@ def run_alone(
     worker: NatNetEmulator, ending: Ending, duration_s: float | None, on_ready: Callable[[], None]
 ) -> None:
     """Let the emulator go on without a wire until the end is asked for or ``duration_s`` is over."""
-    asked = threading.Event()
-    ending.notify(asked.set)
+    asked = Bell()
+    ending.notify(asked.ring)
     worker.begin(time.time_ns())
     on_ready()
     until = None if duration_s is None else time.monotonic() + duration_s
     while not ending.asked and (until is None or time.monotonic() < until):
-        asked.wait(min(max(0.0, (worker.due_ns() - time.time_ns()) * 1e-9), _LONGEST_WAIT))
+        asked.wait(min((worker.due_ns() - time.time_ns()) * 1e-9, _LONGEST_WAIT))
         for _ in worker.take(TICK, time.time_ns()):
             pass
     for _ in worker.end(time.time_ns()):

@@ -26,12 +26,12 @@ def command(secure: Path | None, listen: str | None, zenoh_config: Path | None, 
     It listens on loopback unless told otherwise. With --secure it lets in whoever has a key of DIR, and each
     role does what it is for; without it everybody who reaches the endpoint may do everything.
     """
-    import threading
     import time
 
     from hil.live.daemon import Ending
     from hil.live.service import Service
     from hil.wire.link_watch import links_said
+    from hil.wire.mailbox import Bell
     from hil.wire.refused_links import refused_links_said
     from hil.wire.role_keys import RoleKeys
     from hil.wire.roles import ROUTER
@@ -43,8 +43,8 @@ def command(secure: Path | None, listen: str | None, zenoh_config: Path | None, 
         listen = listen or (SECURE_ENDPOINT if secure else DEFAULT_ENDPOINT)
     endpoints = Endpoints(None, listen, zenoh_config, RoleKeys(secure, ROUTER) if secure else None)
     refuse_deaf(endpoints)
-    ending, asked, service = Ending(), threading.Event(), Service()
-    ending.notify(asked.set)
+    ending, asked, service = Ending(), Bell(), Service()
+    ending.notify(asked.ring)
     ending.on_signals()
     if tethered:
         ending.on_parent_gone()

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import queue
 import signal
 import time
 from collections.abc import Sequence
@@ -25,6 +24,7 @@ from hil.faults.robot import Robot
 from hil.faults.ros_ear import RosEar
 from hil.wire import message_types as msg
 from hil.wire import topics
+from hil.wire.mailbox import Mailbox
 from hil.wire.messages import decode_as, encode, header, to_ns
 from hil.wire.pubsub import Wire
 from hil.wire.session import Endpoints, close_session, open_session
@@ -57,7 +57,7 @@ class Heard(NamedTuple):
     host_ns: int
 
 
-Arrivals = queue.SimpleQueue[Heard]
+Arrivals = Mailbox[Heard]
 
 
 class Ear:
@@ -89,7 +89,7 @@ class Observer:
     """
 
     def __init__(self, places: Sequence[Place], lab: str, notes: TextIO, ros_domain: int | None) -> None:
-        self._arrivals: Arrivals = queue.SimpleQueue()
+        self._arrivals: Arrivals = Mailbox()
         self._robots = {place.name: Robot(place.x, place.y, place.theta) for place in places}
         self._told = {f"{name}/cmd_vel": name for name in self._robots}
         self._notes = notes
@@ -112,11 +112,7 @@ class Observer:
         """Go on until asked to end. ``shows``: the robots are real, and mocap and odometry tell of them."""
         due_s = time.monotonic()
         while not ended:
-            try:
-                heard = self._arrivals.get(timeout=max(1e-4, due_s - time.monotonic()))
-            except queue.Empty:
-                heard = None
-            if heard is not None:
+            if (heard := self._arrivals.take(due_s - time.monotonic())) is not None:
                 self._take(heard)
             if time.monotonic() >= due_s:
                 due_s = max(due_s + FRAME_S, time.monotonic())

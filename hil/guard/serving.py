@@ -17,6 +17,7 @@ from hil.guard.order import GuardOrder
 from hil.guard.report import REPORT_NS
 from hil.guard.robot_shell import RobotShell
 from hil.guard.sd_notify import sd_notify
+from hil.wire.mailbox import Bell
 from hil.wire.session import Endpoints, GaveUpError, close_session, open_session
 
 _REPORT_S = REPORT_NS * 1e-9
@@ -32,10 +33,12 @@ def serve(
     ``ros``: its driver is reached by rclpy, else by the wire. Raises what :func:`open_session` does, and
     :class:`~hil.errors.UsageError` where there is no rclpy.
     """
-    ended = threading.Event()
+    asked: list[int] = []
+    ended = Bell()
 
-    def end(_number: int, _frame: FrameType | None) -> None:
-        ended.set()
+    def end(number: int, _frame: FrameType | None) -> None:
+        asked.append(number)
+        ended.ring()
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
@@ -44,7 +47,7 @@ def serve(
     waiting.daemon = True
     waiting.start()
     try:
-        session = open_session(endpoints, patience=math.inf, give_up=ended.is_set)
+        session = open_session(endpoints, patience=math.inf, give_up=lambda: bool(asked))
     except GaveUpError:
         return
     finally:
@@ -63,9 +66,7 @@ def _driver(session: zenoh.Session, order: GuardOrder, ros: bool) -> Driver:
     return RosDriver(order)
 
 
-def _guard(
-    session: zenoh.Session, order: GuardOrder, driver: Driver, ended: threading.Event, duration_s: float
-) -> None:
+def _guard(session: zenoh.Session, order: GuardOrder, driver: Driver, ended: Bell, duration_s: float) -> None:
     shell = RobotShell(session, order, driver)
     try:
         _say(f"ready, guards {order.robot}")

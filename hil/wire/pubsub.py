@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import queue
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -17,6 +16,7 @@ from hil.wire.clock_query import tell_time
 from hil.wire.events import OVERSIZED, TICK, Event
 from hil.wire.intake import Intake, intake_of
 from hil.wire.key_layout import OURS, KeyLayout, layout_of
+from hil.wire.mailbox import Mailbox
 from hil.wire.outlet import Outlet, gid_of, origin_of
 from hil.wire.ros_tokens import Endpoint, all_tokens, endpoint_in, endpoint_token, node_token
 from hil.wire.router_clients import RouterClients
@@ -38,7 +38,7 @@ class Inbox:
     payloads that ever came in and went out.
     """
 
-    waiting: queue.SimpleQueue[Event] = field(default_factory=queue.SimpleQueue)
+    waiting: Mailbox[Event] = field(default_factory=Mailbox)
     dropped: int = 0
     intake: Intake | None = None
     put_bytes: int = 0
@@ -51,7 +51,7 @@ class Inbox:
             if self.intake is not None and not self.intake.takes(event, time.monotonic_ns()):
                 return
             waiting = self.put_bytes - self.taken_bytes + len(event.payload)
-            if self.waiting.qsize() >= INBOX_LIMIT or waiting > INBOX_BYTES:
+            if len(self.waiting) >= INBOX_LIMIT or waiting > INBOX_BYTES:
                 self.dropped += 1
                 return
             self.put_bytes += len(event.payload)
@@ -59,11 +59,9 @@ class Inbox:
 
     def take(self, timeout: float) -> Event | None:
         """Next event, or None after ``timeout`` [s] without one. Called by one thread."""
-        try:
-            event = self.waiting.get(timeout=timeout) if timeout > 0.0 else self.waiting.get_nowait()
-        except queue.Empty:
-            return None
-        self.taken_bytes += len(event.payload)
+        event = self.waiting.take(timeout)
+        if event is not None:
+            self.taken_bytes += len(event.payload)
         return event
 
 

@@ -14,6 +14,7 @@ from hil.guard import serving
 from hil.guard.order_of import guard_order
 from hil.guard.robot_shell import STUCK_S, RobotShell
 from hil.scenario.files import load_scenario
+from hil.wire.mailbox import Bell
 from hil.wire.session import Endpoints, close_session, open_session, reserved_endpoint
 
 ORDER = guard_order(load_scenario("turtlebot3"), "follower")
@@ -85,7 +86,7 @@ def test_the_process_ends_with_an_error_and_a_standstill(monkeypatch: pytest.Mon
         session = open_session(Endpoints(listen=endpoint))
         monkeypatch.setattr("hil.guard.robot_guard.RobotGuard.say", broken)
         with pytest.raises(CheckFailedError, match="broken down"):
-            serving._guard(session, ORDER, driver, threading.Event(), PATIENCE)
+            serving._guard(session, ORDER, driver, Bell(), PATIENCE)
         close_session(session)
     assert driver.closed
     assert set(driver.told) == {STANDSTILL}

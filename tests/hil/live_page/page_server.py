@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import subprocess
 import sys
 import time
 from collections.abc import Coroutine, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from http.client import HTTPConnection
 from typing import Any
 from urllib.parse import urlsplit
 
 from tornado.httpclient import HTTPRequest
-from tornado.websocket import WebSocketClientConnection, websocket_connect
+from tornado.websocket import WebSocketClientConnection, WebSocketClosedError, websocket_connect
 
 PATIENCE = 180.0
 HUNG_UP = 0
@@ -92,13 +92,15 @@ async def heard(socket: WebSocketClientConnection, kind: str) -> dict[str, Any]:
     while (text := await socket.read_message()) is not None:
         message: dict[str, Any] = json.loads(text, parse_constant=refuse)
         if message["kind"] == "frame":
-            await say(socket, say="seen", frame=message["n"])
+            # What came before a hang-up is still to be read after it.
+            with contextlib.suppress(WebSocketClosedError):
+                await say(socket, say="seen", frame=message["n"])
         if message["kind"] == kind:
             return message
     raise AssertionError(f"closed with {socket.close_code} {socket.close_reason} before {kind}")
 
 
-@contextmanager
+@contextlib.contextmanager
 def live_page(endpoint: str, *options: str) -> Iterator[Server]:
     """``abreast live`` on a lab."""
     words = [sys.executable, "-m", "hil", "live", "--connect", endpoint, *options]

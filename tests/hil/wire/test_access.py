@@ -148,7 +148,7 @@ def test_a_controllers_wildcard_does_not_reach_further_than_the_controller(plain
     controller, allowed = plain.session("controller"), plain.wire("controller", TURTLEBOT3)
     wanted = {("follower/cmd_vel_wanted", b"good")}
     deadline = time.monotonic() + PATIENCE
-    while recorder.inbox.waiting.empty() and time.monotonic() < deadline:
+    while not recorder.inbox.waiting and time.monotonic() < deadline:
         for wild in ("**", "follower/*", "*/cmd_vel", "*"):
             controller.put(wild, b"bad")
         controller.delete("follower/cmd_vel_wanted")
