@@ -25,6 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import abreast
 from benchmarks.bandwidths import Driven, driven
+from formation.angles import wrap
 
 FloatArray = NDArray[np.float64]
 
@@ -188,7 +189,7 @@ def judged(found: abreast.Estimates, leader: Driven, follower: Driven) -> Outcom
     if tracks.sum() > 20:
         for k, name in enumerate(QUANTITIES):
             off = getattr(found, name) - truth[name]
-            off = np.arctan2(np.sin(off), np.cos(off)) if name == "alpha1" else off
+            off = wrap(off) if name == "alpha1" else off
             ratio = (off[tracks] / getattr(found, f"sd_{name}")[tracks]) ** 2
             nees[k], beyond[k] = ratio.mean(), np.mean(ratio > 25.0)
     moves = (found.t - found.t[0] >= SINCE) & (leader.v > 0.4 * leader.v.max())

@@ -89,24 +89,21 @@ def h_of(
     that its bound holds there too. At another station, on its own manifold, v2_hat counts with the sine of
     the bearing, by which its law divides.
     """
-    asked = _asked_across(believed, _across(believed), mu1, spacing, station)
-    h: FloatArray = (_across(truth) + asked) / np.asarray(truth.rho)
-    return h
+    return _h(truth, _across(truth), _asked_across(believed, _across(believed), mu1, spacing, station))
 
 
 def errors_of(
     perceived: Perceived, truth: SpeedInputs, mu1: float, spacing: Spacing, station: Station = ABREAST
 ) -> dict[str, FloatArray]:
     """Actual magnitudes of the errors of v1 [m/s], alpha1 [rad, at most pi] and h [rad/s]."""
-    believed, rho = SpeedInputs(perceived.rho, perceived.v1, perceived.alpha1), np.asarray(truth.rho)
-    across = _across(truth)
+    believed, across = SpeedInputs(perceived.rho, perceived.v1, perceived.alpha1), _across(truth)
     # Both of :func:`h_of`, whose sines take most of the time.
     asked = _asked_across(believed, _across(believed), mu1, spacing, station)
     rightly = _asked_across(truth, across, mu1, spacing, station)
     return {
         "v1": np.abs(np.asarray(truth.v1) - believed.v1),
         "alpha1": np.abs(wrap(np.asarray(truth.alpha1) - believed.alpha1)),
-        "h": np.abs((across + asked) / rho - (across + rightly) / rho),
+        "h": np.abs(_h(truth, across, asked) - _h(truth, across, rightly)),
     }
 
 
@@ -142,6 +139,12 @@ def _tightness(error: FloatArray, limit: FloatArray) -> float:
     else:
         ratio = error / limit
     return float((ratio if counted.all() else ratio[counted]).max(initial=0.0))
+
+
+def _h(truth: SpeedInputs, across: FloatArray, asked: FloatArray) -> FloatArray:
+    """See :func:`h_of`; by the parts across the line of the leader's velocity and of what is asked for."""
+    h: FloatArray = (across + asked) / np.asarray(truth.rho)
+    return h
 
 
 def _across(seen: SpeedInputs) -> FloatArray:

@@ -115,7 +115,7 @@ def extended_v1(perceived: Perceived, rates: RateErrors, inputs: InputErrors) ->
     m_Y = E_rho (|a_hat| + M_alpha2 + E_u2) + rho_hat (M_alpha2 + E_u2); the second by
     :func:`~.live_bounds.motion_error`.
     """
-    return _bounds(perceived, rates, inputs, 0.0, _NO_LAW).v1
+    return _bounds(perceived, rates, (inputs,), 0.0, _NO_LAW)[0].v1
 
 
 def paper_alpha1(perceived: Perceived, rates: RateErrors, v_eps: Values) -> FloatArray:
@@ -151,7 +151,7 @@ def extended_alpha1(
     perceived: Perceived, rates: RateErrors, inputs: InputErrors, v_eps: Values
 ) -> FloatArray:
     """:func:`sound_alpha1` with M_XY of :func:`extended_v1` in the place of M [rad]."""
-    return _bounds(perceived, rates, inputs, v_eps, _NO_LAW).alpha1
+    return _bounds(perceived, rates, (inputs,), v_eps, _NO_LAW)[0].alpha1
 
 
 def paper_h(perceived: Perceived, rates: RateErrors, mu1: float, spacing: Spacing) -> FloatArray:
@@ -192,19 +192,7 @@ def sound_h(
     At another station the law has the sine of the angle by which alpha1 is off in the place of cos(alpha1),
     and f has the sign of the side.
     """
-    return sound_bounds(perceived, rates, v_eps, mu1, spacing, station).h
-
-
-def sound_bounds(
-    perceived: Perceived,
-    rates: RateErrors,
-    v_eps: Values,
-    mu1: float,
-    spacing: Spacing,
-    station: Station = ABREAST,
-) -> Bounds:
-    """:func:`sound_v1`, :func:`sound_alpha1` and :func:`sound_h` at once: extended ones of exact inputs."""
-    return extended_bounds(perceived, rates, InputErrors(), v_eps, mu1, spacing, station)
+    return extended_h(perceived, rates, InputErrors(), v_eps, mu1, spacing, station)
 
 
 def extended_h(
@@ -242,7 +230,7 @@ def extended_bounds(
 ) -> Bounds:
     """:func:`extended_v1`, :func:`extended_alpha1` and :func:`extended_h` at once."""
     law = LawConstants.of(0.0, mu1, spacing, station)
-    return _bounds(perceived, rates, inputs, v_eps, law)
+    return _bounds(perceived, rates, (inputs,), v_eps, law)[0]
 
 
 def sound_and_extended_bounds(
@@ -254,24 +242,14 @@ def sound_and_extended_bounds(
     spacing: Spacing,
     station: Station = ABREAST,
 ) -> tuple[Bounds, Bounds]:
-    """:func:`sound_bounds` and :func:`extended_bounds` at once."""
+    """:func:`extended_bounds` of exact inputs, which are the sound ones, and of such inputs, at once."""
     law = LawConstants.of(0.0, mu1, spacing, station)
-    sound, extended = _bounds_of_all(perceived, rates, (InputErrors(), inputs), v_eps, law)
+    sound, extended = _bounds(perceived, rates, (InputErrors(), inputs), v_eps, law)
     return sound, extended
 
 
 def _bounds(
-    perceived: Perceived, rates: RateErrors, inputs: InputErrors, v_eps: Values, law: LawConstants
-) -> Bounds:
-    return _bounds_of_all(perceived, rates, (inputs,), v_eps, law)[0]
-
-
-def _bounds_of_all(
-    perceived: Perceived,
-    rates: RateErrors,
-    inputs: Sequence[InputErrors],
-    v_eps: Values,
-    law: LawConstants,
+    perceived: Perceived, rates: RateErrors, inputs: Sequence[InputErrors], v_eps: Values, law: LawConstants
 ) -> list[Bounds]:
     """Bounds for each of the input errors."""
     from estimation.bounds.entries import bound_all  # compiles, which who only needs the records is spared

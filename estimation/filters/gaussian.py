@@ -101,6 +101,12 @@ def speed_of(belief: Gaussian) -> float:
 
 
 @kernel
+def variance_along(belief: Gaussian, ex: float, ey: float) -> float:
+    """Variance [m^2/s^2] of the leader's velocity along a unit vector."""
+    return ex * ex * belief.vx_vx + 2.0 * ex * ey * belief.vx_vy + ey * ey * belief.vy_vy
+
+
+@kernel
 def sd_heading_of(belief: Gaussian) -> float:
     """Standard deviation [rad] of the leader's direction of motion; infinite while its speed is zero.
 

@@ -16,6 +16,7 @@ from estimation.tracking.manoeuvre import (
     BY_CHANCE,
     JUDGED,
     LASTS,
+    LEAST_SPEED,
     SET_OFF,
     SPEED_ALARM,
     SPEED_RAISED,
@@ -28,7 +29,6 @@ from estimation.tracking.manoeuvre import (
 )
 from formation.kernel import kernel
 
-_LEAST_SPEED = 1e-9
 _RARE = 0.0027  # share of a normal distribution beyond three standard deviations
 
 
@@ -48,7 +48,7 @@ def borne(
     speed = _likely(along - SPEED_ALARM, 1.0 + (0.5 + manoeuvre.jumps) * chance)
     turn = _likely(across - TURN_ALARM, 1.0)
     if speed > 0.0 and manoeuvre.speed_raised <= 0.0:
-        by = 1.0 / max(speed_of(belief), _LEAST_SPEED)
+        by = 1.0 / max(speed_of(belief), LEAST_SPEED)
         lacking = speed * max(0.0, SPEED_RAISED * limits.k_v * limits.k_v - taken.q_v)
         belief = with_speed_unsure(
             belief, by * belief.vx, by * belief.vy, lacking, min(manoeuvre.running, LASTS)

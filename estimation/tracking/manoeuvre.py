@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from estimation.filters.gaussian import Gaussian, speed_of
+from estimation.filters.gaussian import Gaussian, speed_of, variance_along
 from estimation.models.coordinated_turn import LeaderLimits, ProcessNoise
 from estimation.models.measurement import Measurement
 from formation.kernel import kernel
@@ -48,12 +48,13 @@ such tails as its jumps have."""
 SET_OFF = 1.0
 """Time [s] of a settled track in which no alarm counts as a jump."""
 
+LEAST_SPEED = 1e-9
+"""Speed [m/s] that one below it is taken for where a direction is to be told by it."""
+
 # Share that one alarm adds to how sure it is that a leader makes jumps of its turn rate: these come every few
 # seconds, an alarm by chance once a minute, and one leader in five or so is of that kind.
 _SURE = 0.8
 _APART = 3.0  # standard deviations between a speed before and after an alarm by which it was no chance
-
-_LEAST_SPEED = 1e-9
 
 
 class Manoeuvre(NamedTuple):
@@ -145,8 +146,8 @@ def noticed(
     would have made of it since the run began. Below half of ``v_eps`` there is no direction to tell a run by.
     """
     speed = speed_of(prior)
-    ex, ey = prior.vx / max(speed, _LEAST_SPEED), prior.vy / max(speed, _LEAST_SPEED)
-    variance = ex * ex * prior.vx_vx + 2.0 * ex * ey * prior.vx_vy + ey * ey * prior.vy_vy
+    ex, ey = prior.vx / max(speed, LEAST_SPEED), prior.vy / max(speed, LEAST_SPEED)
+    variance = variance_along(prior, ex, ey)
     manoeuvre = _judged(manoeuvre, speed, variance)
     if speed < 0.5 * limits.v_eps:
         return Noticed(manoeuvre._replace(ahead=0.0, behind=0.0, left=0.0, right=0.0), prior)

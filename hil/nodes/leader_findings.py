@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from estimation.filters.gaussian import Gaussian, speed_of
+from estimation.filters.gaussian import Gaussian, speed_of, variance_along
 from estimation.models.coordinated_turn import LeaderLimits
 from estimation.tracking.track_point import USED, TrackPoint
 from estimation.tracking.travel_watch import TOLD_FOR_NS, TravelWatch
@@ -33,8 +33,8 @@ def limits_findings(point: TrackPoint, limits: LeaderLimits) -> Findings:
 
 def _sd_speed(belief: Gaussian) -> float:
     """Standard deviation of the speed [m/s] of one who moves."""
-    ex, ey = belief.vx / speed_of(belief), belief.vy / speed_of(belief)
-    return math.sqrt(ex * ex * belief.vx_vx + 2.0 * ex * ey * belief.vx_vy + ey * ey * belief.vy_vy)
+    speed = speed_of(belief)
+    return math.sqrt(variance_along(belief, belief.vx / speed, belief.vy / speed))
 
 
 def leader_findings(watch: TravelWatch, now_ns: int) -> Findings:
