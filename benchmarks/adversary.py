@@ -44,8 +44,8 @@ class _Leaders:
         self._cunning = random.random(pairs) < 0.5
         self._margin = random.uniform(0.0, _WIDEST_MARGIN, pairs) * (random.random(pairs) < 0.9)
         self._random, self._system = random, system
-        self.push = system.D * random.choice([-1.0, 1.0], pairs)
-        self.v1 = random.choice([system.speeds.lowest, system.speeds.highest], pairs)
+        self.push = system.D * random.choice(np.array([-1.0, 1.0]), pairs)
+        self.v1 = random.choice(np.array([system.speeds.lowest, system.speeds.highest]), pairs)
 
     def decide(self, theta: FloatArray) -> None:
         """Choose d = -u1 and v1 of each for the next step."""

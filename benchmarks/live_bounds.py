@@ -83,14 +83,16 @@ class Adversary:
         heading = random.uniform(-math.pi, math.pi) + np.concatenate([[0.0], np.cumsum(turn[:-1] * h)])
         half = 0.5 * turn * h
         chords = v1 * h * np.sinc(half / math.pi) * np.exp(1j * (heading + half))
-        return np.concatenate([[0.0], np.cumsum(chords[:-1])]), v1 * np.exp(1j * heading)
+        velocities = np.asarray(v1 * np.exp(1j * heading), dtype=np.complex128)
+        return np.concatenate([[0j], np.cumsum(chords[:-1])]), velocities
 
     def noise(self) -> NDArray[np.complex128]:
         """Errors (n,) of positions, as complex numbers, each axis at its limit."""
         random, limit = self._random, SIGMAS * self._given.estimator.sigma_position
         kind = random.integers(3)
+        signs: list[FloatArray]
         if kind == 0:
-            signs = [random.choice([-1.0, 1.0], FRAMES) for _ in range(2)]
+            signs = [random.choice(np.array([-1.0, 1.0]), FRAMES) for _ in range(2)]
         elif kind == 1:
             hold = random.uniform(0.01, 0.6)
             signs = [self._square(hold, self.period_ns * 1e-9) for _ in range(2)]

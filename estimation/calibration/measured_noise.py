@@ -50,7 +50,7 @@ def _scatter(
     rows = rows[kept]
     if len(rows) < LEAST_DIFFERENCES:
         return None
-    times = (stamps_ns[rows] - stamps_ns[rows[:, :1]]) * _NS
+    times = (stamps_ns[rows] - stamps_ns[rows[:, :1]]).astype(np.float64) * _NS
     differences = np.einsum("ij,ijk->ik", third_differences(times), values[rows])
     return robust_deviation(differences.ravel())
 
