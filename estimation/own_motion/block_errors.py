@@ -10,6 +10,8 @@ from formation.angles import FloatArray
 FEWEST_BLOCKS = 8
 """Blocks there are at least."""
 
+_ALIKE = 1e-12  # share of its own information that one must tell apart from others; sums round to some 1e-14
+
 
 def sandwich(
     information: Matrix, pulls: Matrix, times: Vector, block: float, each: int = 1
@@ -18,13 +20,12 @@ def sandwich(
 
     ``information`` (p, p): curvature of half the loss. ``pulls`` (c n, p): slope of half the loss by each of
     the n residuals of c channels at ``times`` (n,) [s], channel after channel. ``block`` [s]: errors less far
-    apart may be alike. ``each``: of so many residuals
-    that overlap only one counts. None where the parameters are not determined.
+    apart may be alike. ``each``: of so many residuals that overlap only one counts. None where the parameters
+    are not determined.
     """
-    try:
-        inverse = np.linalg.inv(information)
-    except np.linalg.LinAlgError:
+    if not _is_determined(information):
         return None
+    inverse = np.linalg.inv(information)
     span = times[-1] - times[0]
     count = max(FEWEST_BLOCKS, int(span / block))
     places = np.minimum((times - times[0]) / span * count, count - 1).astype(np.int64)
@@ -33,3 +34,16 @@ def sandwich(
     meat = np.stack([each * pulls.T @ pulls, sums.T @ sums * count / (count - 1)])
     covariance: FloatArray = inverse @ meat @ inverse
     return covariance if np.all(np.isfinite(covariance)) else None
+
+
+def _is_determined(information: Matrix) -> bool:
+    """Whether the parameters are told apart, in whatever units they are.
+
+    Of a matrix that is singular up to rounding an inverse may be found, and variances below zero by that.
+    """
+    own = np.diag(information)
+    if not np.all(np.isfinite(information)) or not np.all(own > 0.0):
+        return False
+    unit = np.sqrt(own)
+    rank = np.linalg.matrix_rank(information / np.outer(unit, unit), tol=_ALIKE, hermitian=True)
+    return bool(rank == len(own))

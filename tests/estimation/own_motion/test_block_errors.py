@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from estimation.own_motion.block_errors import sandwich
 
@@ -41,3 +43,18 @@ def test_of_residuals_that_overlap_only_some_count() -> None:
 
 def test_what_is_not_determined_has_no_covariance() -> None:
     assert sandwich(np.zeros((2, 2)), np.ones((20, 2)), np.arange(20.0), 1.0) is None
+
+
+@given(st.integers(0, 10_000), st.lists(st.floats(-6.0, 6.0), min_size=4, max_size=4), st.floats(-5.0, 5.0))
+def test_what_only_rounding_tells_apart_is_not_determined_in_whatever_units(
+    seed: int, powers: list[float], by: float
+) -> None:
+    generator, times = np.random.default_rng(seed), np.linspace(0.0, 9.9, 100)
+    units = 10.0 ** np.array(powers)
+    x, y, offs = generator.normal(size=(3, 100))
+    apart = np.column_stack([x, y, np.ones(100), x + 1e-4 * generator.normal(size=100)]) * units
+    alike = np.column_stack([x, y, np.ones(100), by * x + 3.0]) * units
+    known = sandwich(apart.T @ apart, apart * offs[:, np.newaxis], times, 1.0)
+    assert known is not None
+    assert np.all(np.diagonal(known, axis1=1, axis2=2) > 0.0)
+    assert sandwich(alike.T @ alike, alike * offs[:, np.newaxis], times, 1.0) is None
